@@ -1,0 +1,1 @@
+"""Closed-chain dynamics and balancing on Pinocchio."""

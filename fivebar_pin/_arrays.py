@@ -1,0 +1,61 @@
+"""Shared array habits: check once at the boundary, copy in, freeze."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin.errors import InvalidInputError
+
+Array = npt.NDArray[np.float64]
+
+
+def frozen(values: npt.ArrayLike) -> Array:
+    """Return a read-only float copy."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def checked(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> Array:
+    """Return a read-only float copy of the given shape (None: any length), finite throughout.
+
+    Raises:
+        InvalidInputError: not numeric, wrong shape, or not finite.
+    """
+    try:
+        array = frozen(values)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(name, values, f"must be an array of numbers ({error})") from error
+    wanted = (
+        "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
+    )
+    if array.ndim != len(shape) or any(
+        s is not None and s != g for s, g in zip(shape, array.shape, strict=True)
+    ):
+        raise InvalidInputError(f"shape of {name}", array.shape, f"must be {wanted}")
+    bad = np.argwhere(~np.isfinite(array))
+    if bad.size:
+        index = tuple(int(i) for i in bad[0])
+        raise InvalidInputError(f"{name}{list(index)}", float(array[index]), "must be finite")
+    return array
+
+
+def skew(x: Array) -> Array:
+    """Return [x]× with [x]× y = x × y.  x (..., 3) -> (..., 3, 3)."""
+    S = np.zeros((*x.shape, 3))
+    S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
+    S[..., 1, 0], S[..., 2, 0], S[..., 2, 1] = x[..., 2], -x[..., 1], x[..., 0]
+    return S
+
+
+def cross(x: Array, y: Array) -> Array:
+    """Return x × y along the last axis (far cheaper than np.cross for small batches)."""
+    return np.stack(
+        [
+            x[..., 1] * y[..., 2] - x[..., 2] * y[..., 1],
+            x[..., 2] * y[..., 0] - x[..., 0] * y[..., 2],
+            x[..., 0] * y[..., 1] - x[..., 1] * y[..., 0],
+        ],
+        axis=-1,
+    )

@@ -1,0 +1,214 @@
+"""ClosedChain: the one immutable description of a mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin.closures import Closure
+from fivebar_pin.errors import InvalidInputError, UnknownNameError
+
+__all__ = ["ClosedChain", "Visual"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Visual:
+    """A shape drawn on a frame of the tree; it has no mass.
+
+    Attributes:
+        frame: name of the frame it moves with.
+        shape: "box", "cylinder", "capsule", "sphere" or "mesh".
+        size: box (x, y, z); cylinder and capsule (radius, length along z); sphere (radius,); mesh (scale x, y, z) [m].
+        placement: pose of the shape in the frame, homogeneous (4, 4).
+        rgba: colour, each in [0, 1].
+        mesh: file of a mesh, else "".
+    """
+
+    frame: str
+    shape: str
+    size: tuple[float, ...]
+    placement: Array = field(default_factory=lambda: np.eye(4))
+    rgba: tuple[float, float, float, float] = (0.6, 0.6, 0.65, 1.0)
+    mesh: str = ""
+
+    def __post_init__(self) -> None:
+        lengths = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1, "mesh": 3}
+        if self.shape not in lengths:
+            raise UnknownNameError("visual shape", self.shape, lengths)
+        size = checked(f"size of {self.shape} on {self.frame}", self.size, (lengths[self.shape],))
+        object.__setattr__(self, "size", tuple(float(s) for s in size))
+        object.__setattr__(self, "placement", checked("visual placement", self.placement, (4, 4)))
+        object.__setattr__(self, "rgba", tuple(float(c) for c in checked("rgba", self.rgba, (4,))))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ClosedChain:
+    """An open tree, the closures that make loops of it, and the joints that are driven.
+
+    Args:
+        model: the open tree; copied, the caller's stays untouched.
+        closures: loop closures between frames of the tree.
+        actuated: names of the driven joints, in the order of all actuated columns; each must have one degree of freedom.
+        name: what reports call the mechanism; the model's name unless given.
+        visuals: shapes to draw.
+
+    Raises:
+        InvalidInputError: a closure within one body, a joint named twice or with several degrees of freedom,
+            placements or inertias that are not finite.
+        UnknownNameError: a frame or joint that the model does not have.
+    """
+
+    model: pin.Model
+    closures: tuple[Closure, ...]
+    actuated: tuple[str, ...]
+    name: str = ""
+    visuals: tuple[Visual, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "model", self.model.copy())
+        object.__setattr__(self, "closures", tuple(self.closures))
+        object.__setattr__(self, "actuated", tuple(self.actuated))
+        object.__setattr__(self, "visuals", tuple(self.visuals))
+        object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
+        _check_tree(self.model)
+        _check_closures(self.model, self.closures)
+        _check_actuated(self.model, self.actuated)
+        frames = [f.name for f in self.model.frames]
+        for visual in self.visuals:
+            if visual.frame not in frames:
+                raise UnknownNameError("frame", visual.frame, frames)
+
+    def __repr__(self) -> str:
+        closures = ", ".join(f"{c.name} ({c.kind.value})" for c in self.closures) or "none"
+        return (
+            f"ClosedChain({self.name!r}: {self.model.njoints - 1} joints, nq = {self.nq}, nv = {self.nv}; "
+            f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'})"
+        )
+
+    @property
+    def nq(self) -> int:
+        """Length of a configuration."""
+        return int(self.model.nq)
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom of the open tree."""
+        return int(self.model.nv)
+
+    @property
+    def na(self) -> int:
+        """Number of actuated coordinates."""
+        return len(self.actuated)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints of the tree, without the universe."""
+        return tuple(self.model.names)[1:]
+
+    @property
+    def mass(self) -> float:
+        """Total moving mass [kg]."""
+        return float(sum(I.mass for I in list(self.model.inertias)[1:]))
+
+    @cached_property
+    def actuated_index(self) -> npt.NDArray[np.intp]:
+        """Positions of the actuated coordinates in v (na,)."""
+        model = self.model
+        return np.array([model.idx_vs[model.getJointId(j)] for j in self.actuated], dtype=np.intp)
+
+    @cached_property
+    def passive_index(self) -> npt.NDArray[np.intp]:
+        """Positions of the passive coordinates in v (nv - na,)."""
+        return np.setdiff1d(np.arange(self.nv), self.actuated_index)
+
+    @cached_property
+    def inertial_parameters(self) -> Array:
+        """Inertial parameters of the moving bodies (njoints - 1, 10), Pinocchio's order, about the joint origin."""
+        return frozen([I.toDynamicParameters() for I in list(self.model.inertias)[1:]])
+
+    @cached_property
+    def length(self) -> float:
+        """Characteristic length [m]: the mean distance between neighbouring joints, closures included."""
+        model = self.model
+        spans = [float(np.linalg.norm(model.jointPlacements[j].translation)) for j in range(1, model.njoints)]
+        for closure in self.closures:
+            for f in closure.frames:
+                spans.append(float(np.linalg.norm(model.frames[model.getFrameId(f)].placement.translation)))
+        real = [s for s in spans if s > 0.0]
+        return float(np.mean(real)) if real else 1.0
+
+    def with_inertias(self, inertias: Mapping[str, pin.Inertia]) -> ClosedChain:
+        """Return the same mechanism with other inertias for the named joints' bodies."""
+        model = self.model.copy()
+        for joint, inertia in inertias.items():
+            if joint not in self.joints:
+                raise UnknownNameError("joint", joint, self.joints)
+            model.inertias[model.getJointId(joint)] = inertia
+        return replace(self, model=model)
+
+    def with_inertial_parameters(self, parameters: npt.ArrayLike) -> ClosedChain:
+        """Return the same mechanism with the given inertial parameters (njoints - 1, 10)."""
+        pi = checked("inertial parameters", parameters, (self.model.njoints - 1, 10))
+        return self.with_inertias(
+            {j: pin.Inertia.FromDynamicParameters(row) for j, row in zip(self.joints, pi, strict=True)}
+        )
+
+    def with_gravity(self, gravity: npt.ArrayLike) -> ClosedChain:
+        """Return the same mechanism under another gravity (3,) [m/s2]."""
+        model = self.model.copy()
+        model.gravity.linear = np.array(checked("gravity", gravity, (3,)))
+        return replace(self, model=model)
+
+    def with_actuated(self, actuated: Iterable[str]) -> ClosedChain:
+        """Return the same mechanism driven at other joints."""
+        return replace(self, actuated=tuple(actuated))
+
+
+def _check_tree(model: pin.Model) -> None:
+    for j in range(1, model.njoints):
+        placement, inertia = model.jointPlacements[j], model.inertias[j]
+        name = model.names[j]
+        if not np.all(np.isfinite(placement.homogeneous)):
+            raise InvalidInputError(f"placement of joint {name}", "nan", "must be finite")
+        if not np.all(np.isfinite(inertia.toDynamicParameters())):
+            raise InvalidInputError(f"inertia of joint {name}", "nan", "must be finite")
+        if inertia.mass < 0.0:
+            raise InvalidInputError(
+                f"mass of the body of joint {name}", inertia.mass, "must not be negative [kg]"
+            )
+
+
+def _check_closures(model: pin.Model, closures: tuple[Closure, ...]) -> None:
+    frames = [f.name for f in model.frames]
+    for closure in closures:
+        for frame in closure.frames:
+            if frame not in frames:
+                raise UnknownNameError(f"frame of closure {closure.name}", frame, frames)
+        first, second = (model.frames[model.getFrameId(f)].parentJoint for f in closure.frames)
+        if first == second:
+            raise InvalidInputError(
+                f"closure {closure.name}",
+                closure.frames,
+                f"joins two frames of one body ({model.names[first]})",
+            )
+    names = [c.name for c in closures]
+    if len(set(names)) != len(names):
+        raise InvalidInputError("closure names", names, "must differ")
+
+
+def _check_actuated(model: pin.Model, actuated: tuple[str, ...]) -> None:
+    joints = list(model.names)[1:]
+    for k, name in enumerate(actuated):
+        if name not in joints:
+            raise UnknownNameError("actuated joint", name, joints)
+        if name in actuated[:k]:
+            raise InvalidInputError("actuated joints", actuated, f"{name!r} is named twice")
+        nv = model.joints[model.getJointId(name)].nv
+        if nv != 1:
+            raise InvalidInputError(f"actuated joint {name}", f"nv = {nv}", "must have one degree of freedom")

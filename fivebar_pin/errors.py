@@ -1,0 +1,140 @@
+"""The exception family: every error carries its evidence and says what to do about it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = [
+    "AssemblyError",
+    "BranchError",
+    "FileFormatError",
+    "FiveBarPinError",
+    "InfeasibleError",
+    "InvalidInputError",
+    "OutputError",
+    "SingularityError",
+    "SolverError",
+    "UnknownNameError",
+]
+
+
+class FiveBarPinError(Exception):
+    """Base of all errors raised on purpose by this library."""
+
+
+class InvalidInputError(FiveBarPinError, ValueError):
+    """A value that cannot be used.
+
+    Attributes:
+        name: what the value is called.
+        value: the offending value.
+        bound: the rule it breaks, in words.
+    """
+
+    def __init__(self, name: str, value: object, bound: str, hint: str = "") -> None:
+        self.name, self.value, self.bound = name, value, bound
+        super().__init__(f"{name} = {value!r} but {bound}." + (f" {hint}" if hint else ""))
+
+
+class UnknownNameError(FiveBarPinError, LookupError):
+    """A name that is not known. Lists the known ones.
+
+    Attributes:
+        kind: the kind of thing looked for (joint, frame, case, ...).
+        name: the name asked for.
+        known: the names that exist.
+    """
+
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+        self.kind, self.name, self.known = kind, name, tuple(known)
+        close = difflib.get_close_matches(str(name), self.known, n=1)
+        meant = f" Did you mean {close[0]!r}?" if close else ""
+        listed = ", ".join(self.known) if self.known else "(none)"
+        super().__init__(f"Unknown {kind} {name!r}; known: {listed}.{meant}")
+
+
+class AssemblyError(FiveBarPinError):
+    """The loops cannot be closed.
+
+    Attributes:
+        closure: name of the closure that stays open the most.
+        residual: how far it stays open [m or rad].
+        sample: index of the motion sample, or None.
+        time: its time [s], or None.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        closure: str,
+        residual: float,
+        sample: int | None = None,
+        time: float | None = None,
+    ) -> None:
+        self.closure, self.residual, self.sample, self.time = closure, residual, sample, time
+        super().__init__(message)
+
+
+class BranchError(AssemblyError):
+    """The loops close, but not on the assembly mode that was asked for or was being followed."""
+
+
+class SingularityError(FiveBarPinError):
+    """The passive coordinates are not determined by the actuated ones (type 2 singularity).
+
+    Attributes:
+        sigma: smallest singular value of the scaled passive closure Jacobian [-].
+        sample: index of the motion sample, or None.
+        time: its time [s], or None.
+    """
+
+    def __init__(
+        self, message: str, *, sigma: float, sample: int | None = None, time: float | None = None
+    ) -> None:
+        self.sigma, self.sample, self.time = sigma, sample, time
+        super().__init__(message)
+
+
+class InfeasibleError(FiveBarPinError):
+    """No design fulfils the conditions within the bounds."""
+
+
+class SolverError(FiveBarPinError):
+    """A solver did not reach its tolerance.
+
+    Attributes:
+        residual: the residual it stopped at.
+        tolerance: the one it had to reach.
+    """
+
+    def __init__(
+        self, message: str, *, residual: float = float("nan"), tolerance: float = float("nan")
+    ) -> None:
+        self.residual, self.tolerance = residual, tolerance
+        super().__init__(message)
+
+
+class FileFormatError(FiveBarPinError):
+    """A file that cannot be read as what it should be.
+
+    Attributes:
+        path: the file.
+    """
+
+    def __init__(self, path: object, problem: str) -> None:
+        self.path = str(path)
+        super().__init__(f"{path}: {problem}")
+
+
+class OutputError(FiveBarPinError):
+    """An output that cannot be written, or would overwrite something.
+
+    Attributes:
+        path: the file or folder.
+    """
+
+    def __init__(self, path: object, problem: str) -> None:
+        self.path = str(path)
+        super().__init__(f"{path}: {problem}")

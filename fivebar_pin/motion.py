@@ -1,0 +1,222 @@
+"""Motion of the actuated coordinates, and the motion laws that make one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, checked
+from fivebar_pin.errors import FileFormatError, InvalidInputError
+
+__all__ = [
+    "Motion",
+    "combine",
+    "constant",
+    "cycloidal",
+    "from_file",
+    "harmonic",
+    "polynomial",
+    "spline",
+    "to_file",
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Sampled motion of the actuated coordinates.
+
+    Attributes:
+        t: times, strictly increasing (n,) [s].
+        q: coordinates (n, na) [rad or m]; the columns follow `ClosedChain.actuated`.
+        v: velocities (n, na).
+        a: accelerations (n, na).
+
+    Raises:
+        InvalidInputError: shapes that do not fit, values that are not finite, times that do not increase.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+
+    def __post_init__(self) -> None:
+        t = checked("motion.t", self.t, (None,))
+        if t.size == 0:
+            raise InvalidInputError("motion.t", [], "must hold at least one sample")
+        q = checked("motion.q", self.q, (t.size, None))
+        v = checked("motion.v", self.v, q.shape)
+        a = checked("motion.a", self.a, q.shape)
+        late = np.flatnonzero(np.diff(t) <= 0.0)
+        if late.size:
+            k = int(late[0]) + 1
+            raise InvalidInputError(
+                f"motion.t[{k}]", float(t[k]), f"times must increase (t[{k - 1}] = {t[k - 1]})"
+            )
+        for name, array in (("t", t), ("q", q), ("v", v), ("a", a)):
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    @property
+    def na(self) -> int:
+        """Number of actuated coordinates."""
+        return int(self.q.shape[1])
+
+    def scaled(self, speed: float) -> Motion:
+        """Return the same path run `speed` times as fast."""
+        if not (np.isfinite(speed) and speed > 0.0):
+            raise InvalidInputError("speed", speed, "must be positive and finite")
+        return Motion(self.t / speed, self.q, self.v * speed, self.a * speed**2)
+
+
+def combine(*motions: Motion) -> Motion:
+    """Put motions over the same times side by side, one column after the other."""
+    if not motions:
+        raise InvalidInputError("motions", [], "must hold at least one motion")
+    t = motions[0].t
+    for k, m in enumerate(motions):
+        if m.t.shape != t.shape or not np.array_equal(m.t, t):
+            raise InvalidInputError(f"motions[{k}].t", m.t.shape, "must equal the times of motions[0]")
+    return Motion(t, *(np.concatenate([getattr(m, x) for m in motions], axis=1) for x in ("q", "v", "a")))
+
+
+def constant(t: npt.ArrayLike, value: float) -> Motion:
+    """Hold one coordinate still."""
+    time = checked("t", t, (None,))
+    zero = np.zeros_like(time)
+    return _column(time, zero + value, zero, zero)
+
+
+def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | None = None) -> Motion:
+    """Move from start to stop along a cycloid: q = start + h (s - sin(2 pi s) / 2 pi), s = (t - t_0) / duration.
+
+    Velocity and acceleration vanish at both ends; after the end the coordinate stays.
+
+    Args:
+        t: times (n,) [s].
+        start, stop: values at the ends [rad or m].
+        duration: length of the move [s]; the whole of t unless given.
+    """
+    time, T, s, moving = _phase(t, duration)
+    h, w = stop - start, 2.0 * np.pi
+    return _column(
+        time,
+        start + h * (s - np.sin(w * s) / w),
+        moving * h / T * (1.0 - np.cos(w * s)),
+        moving * h * w / T**2 * np.sin(w * s),
+    )
+
+
+def harmonic(t: npt.ArrayLike, mean: float, amplitude: float, *, period: float, phase: float = 0.0) -> Motion:
+    """Swing about a mean: q = mean + amplitude cos(2 pi t / period + phase)."""
+    time = checked("t", t, (None,))
+    _positive("period", period)
+    w = 2.0 * np.pi / period
+    x = w * time + phase
+    return _column(
+        time, mean + amplitude * np.cos(x), -amplitude * w * np.sin(x), -amplitude * w**2 * np.cos(x)
+    )
+
+
+def polynomial(
+    t: npt.ArrayLike, start: float, stop: float, *, degree: int = 5, duration: float | None = None
+) -> Motion:
+    """Move from rest to rest along the 3-4-5 (degree 5) or 4-5-6-7 (degree 7) polynomial."""
+    known = {3: [3, -2], 5: [10, -15, 6], 7: [35, -84, 70, -20]}
+    if degree not in known:
+        raise InvalidInputError("degree", degree, f"must be one of {sorted(known)}")
+    time, T, s, moving = _phase(t, duration)
+    first = (degree + 1) // 2
+    p = np.polynomial.Polynomial([0.0] * first + [float(c) for c in known[degree]])
+    h = stop - start
+    return _column(time, start + h * p(s), moving * h / T * p.deriv()(s), moving * h / T**2 * p.deriv(2)(s))
+
+
+def spline(
+    t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, periodic: bool = False
+) -> Motion:
+    """Pass through given values with a quintic spline (continuous to the fourth derivative).
+
+    Args:
+        t: times to sample (n,) [s], within the knots.
+        knots: times of the given values (k,) [s], strictly increasing, at least six.
+        values: values at the knots (k,) or (k, na).
+        periodic: whether the first and last knot are the same instant of a cycle.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    time, x = checked("t", t, (None,)), checked("knots", knots, (None,))
+    y = np.array(values, dtype=np.float64)
+    y = checked("values", y[:, None] if y.ndim == 1 else y, (x.size, None))
+    if x.size < 6 or np.any(np.diff(x) <= 0.0):
+        raise InvalidInputError("knots", x.tolist(), "must be at least six, strictly increasing")
+    if time.size and (time.min() < x[0] or time.max() > x[-1]):
+        raise InvalidInputError(
+            "t", [float(time.min()), float(time.max())], f"must lie within [{x[0]}, {x[-1]}]"
+        )
+    if periodic and not np.allclose(y[0], y[-1], rtol=0.0, atol=1e-12 * (1.0 + np.abs(y).max())):
+        raise InvalidInputError(
+            "values[-1]", y[-1].tolist(), f"must equal values[0] = {y[0].tolist()} when periodic"
+        )
+    if periodic:
+        y = np.concatenate([y[:-1], y[:1]])
+    curve = make_interp_spline(x, y, k=5, bc_type="periodic" if periodic else None)
+    return Motion(time, curve(time), curve.derivative(1)(time), curve.derivative(2)(time))
+
+
+def from_file(path: str | Path) -> Motion:
+    """Read a motion from a csv file with the columns t, q_*, v_*, a_* (one of each per actuated coordinate).
+
+    The part after q_, v_, a_ is free but must agree; the order is that of the q columns.
+    """
+    file = Path(path)
+    try:
+        table = np.genfromtxt(
+            file, delimiter=",", names=True, dtype=np.float64, deletechars="", encoding="utf-8"
+        )
+    except (OSError, UnicodeDecodeError, ValueError, IndexError, StopIteration) as error:
+        raise FileFormatError(file, f"cannot be read as a motion table ({error})") from error
+    names = list(table.dtype.names or ())
+    columns = [name[2:] for name in names if name.startswith("q_")]
+    wanted = ["t"] + [f"{x}_{c}" for x in "qva" for c in columns]
+    missing = [name for name in wanted if name not in names]
+    if missing or not columns:
+        raise FileFormatError(
+            file, f"needs the columns t, q_*, v_*, a_*; missing {', '.join(missing) or 'q_*'}"
+        )
+    table = np.atleast_1d(table)
+    return Motion(table["t"], *(np.stack([table[f"{x}_{c}"] for c in columns], axis=1) for x in "qva"))
+
+
+def to_file(motion: Motion, path: str | Path, names: tuple[str, ...]) -> None:
+    """Write the csv that `from_file` reads; `names` are the actuated joints."""
+    if len(names) != motion.na:
+        raise InvalidInputError("names", names, f"must be {motion.na} names")
+    header = ",".join(["t", *(f"{x}_{n}" for x in "qva" for n in names)])
+    body = np.column_stack([motion.t, motion.q, motion.v, motion.a])
+    np.savetxt(path, body, delimiter=",", header=header, comments="", fmt="%.17g")
+
+
+def _phase(t: npt.ArrayLike, duration: float | None) -> tuple[Array, float, Array, Array]:
+    """Return the times, the duration, the phase in [0, 1] and 1.0 where the move is under way."""
+    time = checked("t", t, (None,))
+    if time.size == 0:
+        raise InvalidInputError("t", [], "must hold at least one sample")
+    T = float(time[-1] - time[0]) if duration is None else float(duration)
+    _positive("duration", T)
+    s = np.clip((time - time[0]) / T, 0.0, 1.0)
+    return time, T, s, ((time - time[0]) <= T).astype(np.float64)
+
+
+def _column(t: Array, q: Array, v: Array, a: Array) -> Motion:
+    return Motion(t, q[:, None], v[:, None], a[:, None])
+
+
+def _positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise InvalidInputError(name, value, "must be positive and finite")

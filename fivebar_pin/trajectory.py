@@ -1,0 +1,46 @@
+"""Trajectory: the motion of the whole tree, whichever road computed it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fivebar_pin._arrays import Array, frozen
+
+__all__ = ["Trajectory"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Consistent motion of all coordinates of a closed chain.
+
+    Attributes:
+        t: times (n,) [s].
+        q: configurations (n, nq), Pinocchio's layout.
+        v: velocities (n, nv) [rad/s or m/s].
+        a: accelerations (n, nv).
+        N: complement (n, nv, na): v = N @ v_actuated, J N = 0.
+        closure_residual: largest closure residual of each sample (n,) [m or rad].
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    N: Array
+    closure_residual: Array
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if value.flags.writeable:
+                object.__setattr__(self, name, frozen(value))
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    @property
+    def worst_closure(self) -> float:
+        """Largest closure residual over all samples [m or rad]."""
+        return float(np.max(self.closure_residual))
