@@ -27,12 +27,8 @@ def checked(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> 
         array = frozen(values)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(name, values, f"must be an array of numbers ({error})") from error
-    wanted = (
-        "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
-    )
-    if array.ndim != len(shape) or any(
-        s is not None and s != g for s, g in zip(shape, array.shape, strict=True)
-    ):
+    wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
+    if array.ndim != len(shape) or any(s is not None and s != g for s, g in zip(shape, array.shape, strict=True)):
         raise InvalidInputError(f"shape of {name}", array.shape, f"must be {wanted}")
     bad = np.argwhere(~np.isfinite(array))
     if bad.size:

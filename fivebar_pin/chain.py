@@ -54,7 +54,7 @@ class ClosedChain:
     Args:
         model: the open tree; copied, the caller's stays untouched.
         closures: loop closures between frames of the tree.
-        actuated: names of the driven joints, in the order of all actuated columns; each must have one degree of freedom.
+        actuated: names of the driven joints, in the order of all actuated columns; one degree of freedom each.
         name: what reports call the mechanism; the model's name unless given.
         visuals: shapes to draw.
 
@@ -179,9 +179,7 @@ def _check_tree(model: pin.Model) -> None:
         if not np.all(np.isfinite(inertia.toDynamicParameters())):
             raise InvalidInputError(f"inertia of joint {name}", "nan", "must be finite")
         if inertia.mass < 0.0:
-            raise InvalidInputError(
-                f"mass of the body of joint {name}", inertia.mass, "must not be negative [kg]"
-            )
+            raise InvalidInputError(f"mass of the body of joint {name}", inertia.mass, "must not be negative [kg]")
 
 
 def _check_closures(model: pin.Model, closures: tuple[Closure, ...]) -> None:

@@ -66,11 +66,7 @@ class Closure:
 
     def __post_init__(self) -> None:
         frames = tuple(self.frames)
-        if (
-            isinstance(self.frames, str)
-            or len(frames) != 2
-            or not all(isinstance(f, str) and f for f in frames)
-        ):
+        if isinstance(self.frames, str) or len(frames) != 2 or not all(isinstance(f, str) and f for f in frames):
             raise InvalidInputError("closure frames", self.frames, "must be two frame names")
         object.__setattr__(self, "frames", frames)
         object.__setattr__(self, "kind", ClosureKind.parse(self.kind))
@@ -105,7 +101,7 @@ class FramePair:
 def residual(closure: Closure, pair: FramePair) -> Array:
     """Return the rows that vanish when the loop is closed, (..., m)."""
     R1T = np.swapaxes(pair.R1, -1, -2)
-    point = np.matmul(R1T, (pair.p2 - pair.p1)[..., None])[..., 0]
+    point: Array = np.matmul(R1T, (pair.p2 - pair.p1)[..., None])[..., 0]
     if closure.kind is ClosureKind.POINT:
         return point
     Q = np.matmul(R1T, pair.R2)
@@ -142,7 +138,7 @@ def drift(closure: Closure, pair: FramePair, V1: Array, V2: Array, A1: Array, A2
     a1 = _point_acceleration(V1, A1, pair.p1)
     d_rate = _point_velocity(V2, pair.p2) - _point_velocity(V1, pair.p1)
     local_rate = d_rate - cross(w1, d)
-    point = a2 - a1 - cross(A1[..., 3:], d) - cross(w1, cross(w1, d)) - 2.0 * cross(w1, local_rate)
+    point: Array = a2 - a1 - cross(A1[..., 3:], d) - cross(w1, cross(w1, d)) - 2.0 * cross(w1, local_rate)
     R1T = np.swapaxes(pair.R1, -1, -2)
     point = np.matmul(R1T, point[..., None])[..., 0]
     if closure.kind is ClosureKind.POINT:
@@ -180,9 +176,7 @@ def _left_jacobian_inverse(phi: Array) -> Array:
     half = 0.5 * angle
     small = angle < 1e-3
     safe = np.where(small, 1.0, half)
-    b = np.where(
-        small, 1.0 / 12.0 + angle2 / 720.0, (1.0 - safe / np.tan(safe)) / np.where(small, 1.0, angle2)
-    )
+    b = np.where(small, 1.0 / 12.0 + angle2 / 720.0, (1.0 - safe / np.tan(safe)) / np.where(small, 1.0, angle2))
     K = skew(phi)
     return np.asarray(np.eye(3) - 0.5 * K + b * np.matmul(K, K))
 

@@ -90,9 +90,7 @@ class SingularityError(FiveBarPinError):
         time: its time [s], or None.
     """
 
-    def __init__(
-        self, message: str, *, sigma: float, sample: int | None = None, time: float | None = None
-    ) -> None:
+    def __init__(self, message: str, *, sigma: float, sample: int | None = None, time: float | None = None) -> None:
         self.sigma, self.sample, self.time = sigma, sample, time
         super().__init__(message)
 
@@ -109,9 +107,7 @@ class SolverError(FiveBarPinError):
         tolerance: the one it had to reach.
     """
 
-    def __init__(
-        self, message: str, *, residual: float = float("nan"), tolerance: float = float("nan")
-    ) -> None:
+    def __init__(self, message: str, *, residual: float = float("nan"), tolerance: float = float("nan")) -> None:
         self.residual, self.tolerance = residual, tolerance
         super().__init__(message)
 

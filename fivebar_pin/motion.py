@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -53,9 +54,7 @@ class Motion:
         late = np.flatnonzero(np.diff(t) <= 0.0)
         if late.size:
             k = int(late[0]) + 1
-            raise InvalidInputError(
-                f"motion.t[{k}]", float(t[k]), f"times must increase (t[{k - 1}] = {t[k - 1]})"
-            )
+            raise InvalidInputError(f"motion.t[{k}]", float(t[k]), f"times must increase (t[{k - 1}] = {t[k - 1]})")
         for name, array in (("t", t), ("q", q), ("v", v), ("a", a)):
             object.__setattr__(self, name, array)
 
@@ -118,9 +117,7 @@ def harmonic(t: npt.ArrayLike, mean: float, amplitude: float, *, period: float, 
     _positive("period", period)
     w = 2.0 * np.pi / period
     x = w * time + phase
-    return _column(
-        time, mean + amplitude * np.cos(x), -amplitude * w * np.sin(x), -amplitude * w**2 * np.cos(x)
-    )
+    return _column(time, mean + amplitude * np.cos(x), -amplitude * w * np.sin(x), -amplitude * w**2 * np.cos(x))
 
 
 def polynomial(
@@ -137,9 +134,7 @@ def polynomial(
     return _column(time, start + h * p(s), moving * h / T * p.deriv()(s), moving * h / T**2 * p.deriv(2)(s))
 
 
-def spline(
-    t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, periodic: bool = False
-) -> Motion:
+def spline(t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, periodic: bool = False) -> Motion:
     """Pass through given values with a quintic spline (continuous to the fourth derivative).
 
     Args:
@@ -156,13 +151,9 @@ def spline(
     if x.size < 6 or np.any(np.diff(x) <= 0.0):
         raise InvalidInputError("knots", x.tolist(), "must be at least six, strictly increasing")
     if time.size and (time.min() < x[0] or time.max() > x[-1]):
-        raise InvalidInputError(
-            "t", [float(time.min()), float(time.max())], f"must lie within [{x[0]}, {x[-1]}]"
-        )
+        raise InvalidInputError("t", [float(time.min()), float(time.max())], f"must lie within [{x[0]}, {x[-1]}]")
     if periodic and not np.allclose(y[0], y[-1], rtol=0.0, atol=1e-12 * (1.0 + np.abs(y).max())):
-        raise InvalidInputError(
-            "values[-1]", y[-1].tolist(), f"must equal values[0] = {y[0].tolist()} when periodic"
-        )
+        raise InvalidInputError("values[-1]", y[-1].tolist(), f"must equal values[0] = {y[0].tolist()} when periodic")
     if periodic:
         y = np.concatenate([y[:-1], y[:1]])
     curve = make_interp_spline(x, y, k=5, bc_type="periodic" if periodic else None)
@@ -176,9 +167,7 @@ def from_file(path: str | Path) -> Motion:
     """
     file = Path(path)
     try:
-        table = np.genfromtxt(
-            file, delimiter=",", names=True, dtype=np.float64, deletechars="", encoding="utf-8"
-        )
+        table: Any = np.genfromtxt(file, delimiter=",", names=True, dtype=np.float64, deletechars="", encoding="utf-8")
     except (OSError, UnicodeDecodeError, ValueError, IndexError, StopIteration) as error:
         raise FileFormatError(file, f"cannot be read as a motion table ({error})") from error
     names = list(table.dtype.names or ())
@@ -186,11 +175,9 @@ def from_file(path: str | Path) -> Motion:
     wanted = ["t"] + [f"{x}_{c}" for x in "qva" for c in columns]
     missing = [name for name in wanted if name not in names]
     if missing or not columns:
-        raise FileFormatError(
-            file, f"needs the columns t, q_*, v_*, a_*; missing {', '.join(missing) or 'q_*'}"
-        )
-    table = np.atleast_1d(table)
-    return Motion(table["t"], *(np.stack([table[f"{x}_{c}"] for c in columns], axis=1) for x in "qva"))
+        raise FileFormatError(file, f"needs the columns t, q_*, v_*, a_*; missing {', '.join(missing) or 'q_*'}")
+    column = {name: np.atleast_1d(np.asarray(table[name], dtype=np.float64)) for name in wanted}
+    return Motion(column["t"], *(np.stack([column[f"{x}_{c}"] for c in columns], axis=1) for x in "qva"))
 
 
 def to_file(motion: Motion, path: str | Path, names: tuple[str, ...]) -> None:
