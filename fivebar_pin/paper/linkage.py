@@ -1,0 +1,300 @@
+"""The paper's five-bar as parameters, as a ClosedChain, and as configurations of that chain.
+
+Pivots O1 = (0, 0) and O0 = (a5, 0); links O1-O2 (a1, psi), O2-O3 (a2, theta), O4-O3 (a3, phi), O0-O4 (a4, gamma);
+absolute angles from the x axis, plane x-y. The open tree is cut at O3. With kappa_i = rho_i exp(i alpha_i), the
+vector from O_i to the mass centre C_i is r_i = kappa_i r_{i,i+1}, (54)-(57); link 3 starts at O3, link 4 at O4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from fivebar_pin import motion as laws
+from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin.chain import ClosedChain, Visual
+from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.motion import Motion
+
+__all__ = ["AssemblyMode", "FiveBar", "default_motion", "table_1"]
+
+CArray = npt.NDArray[np.complex128]
+
+_WIDE = 1e4  # joint limit [rad]: the angles may turn many times
+_COLOURS = ((0.16, 0.44, 0.70), (0.90, 0.62, 0.10), (0.34, 0.62, 0.32), (0.76, 0.30, 0.28))
+
+
+class AssemblyMode(Enum):
+    """Which of the two solutions of the loop closure (6): O3 to the left or right of the ray from O2 to O4."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+    @property
+    def sign(self) -> float:
+        """+1 for LEFT, -1 for RIGHT."""
+        return 1.0 if self is AssemblyMode.LEFT else -1.0
+
+    @classmethod
+    def parse(cls, value: object) -> AssemblyMode:
+        """Return the mode given as such or by its word.
+
+        Raises:
+            UnknownNameError: neither "left" nor "right".
+        """
+        if isinstance(value, cls):
+            return value
+        try:
+            return cls(str(value).strip().lower())
+        except ValueError:
+            raise UnknownNameError("assembly mode", value, [m.value for m in cls]) from None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FiveBar:
+    """Parameters of the planar five-bar linkage.
+
+    Attributes:
+        lengths: a1 .. a5 (5,) [m]; a5 is the distance of the fixed pivots.
+        masses: m1 .. m4 (4,) [kg].
+        inertias: polar inertia of each link about its own mass centre (4,) [kg m2].
+        rho: |r_i| / |r_{i,i+1}| (4,) [-], (56); a negative value puts the mass centre behind O_i.
+        alpha: angle from r_{i,i+1} to r_i (4,) [rad], (57).
+
+    Raises:
+        InvalidInputError: wrong shapes; values that are not finite; lengths or masses that are not positive; an
+            inertia too small for its mass. The inertia is taken about the mass centre, where every body of positive
+            mass and extent has I > 0, however small: this is the only bound, so slender and nearly point-like
+            bodies are allowed.
+    """
+
+    lengths: Array
+    masses: Array
+    inertias: Array
+    rho: Array
+    alpha: Array
+
+    def __init__(
+        self,
+        lengths: npt.ArrayLike,
+        masses: npt.ArrayLike,
+        inertias: npt.ArrayLike,
+        rho: npt.ArrayLike,
+        alpha: npt.ArrayLike,
+    ) -> None:
+        given = {"lengths": lengths, "masses": masses, "inertias": inertias, "rho": rho, "alpha": alpha}
+        for name, values in given.items():
+            object.__setattr__(self, name, checked(name, values, (5,) if name == "lengths" else (4,)))
+        _all_positive("lengths", self.lengths, "must be positive [m]")
+        _all_positive("masses", self.masses, "must be positive [kg]")
+        for k, inertia in enumerate(self.inertias):
+            if inertia <= 0.0:
+                raise InvalidInputError(
+                    f"inertias[{k}]",
+                    float(inertia),
+                    f"is too small for a mass of {self.masses[k]:g} kg: the inertia about the mass centre must be "
+                    "positive [kg m2]",
+                )
+
+    def __repr__(self) -> str:
+        fields = ", ".join(f"{name}={getattr(self, name).tolist()}" for name in FiveBar.__slots__)
+        return f"FiveBar({fields})"
+
+    @property
+    def kappa(self) -> CArray:
+        """rho_i exp(i alpha_i) (4,) [-]: r_i over r_{i,i+1} as complex numbers, (55)."""
+        return np.asarray(self.rho * np.exp(1j * self.alpha))
+
+    @property
+    def mass_ratios(self) -> Array:
+        """mu_i = m_i / m (4,) [-], (53)."""
+        return np.asarray(self.masses / self.masses.sum())
+
+    @property
+    def offsets(self) -> CArray:
+        """Mass centre of each link in its own axes, x along the link, seen from its joint in the tree (4,) [m].
+
+        The joints are O1, O2, O4, O0 for the links 1 to 4; the paper measures links 3 and 4 from their other end.
+        """
+        kappa = self.kappa
+        return np.asarray(self.lengths[:4] * np.array([kappa[0], kappa[1], 1.0 - kappa[2], 1.0 - kappa[3]]))
+
+    def chain(self, *, gravity: npt.ArrayLike = (0.0, 0.0, 0.0)) -> ClosedChain:
+        """Return the linkage as an open tree cut at O3, with its closure and its motors at psi and gamma.
+
+        The joints are gamma, phi_gamma, psi, theta_psi in this order, q = (gamma, phi - gamma, psi, theta - psi).
+        The bodies are flat in the x-y plane: Izz is the given inertia about the mass centre and Ixx = Iyy = Izz / 2,
+        which every flat body with equal spread along and across satisfies; the planar motion never feels Ixx, Iyy.
+
+        Args:
+            gravity: (3,) [m/s2].
+        """
+        model = pin.Model()
+        model.name = "five_bar"
+        model.gravity.linear = np.array(checked("gravity", gravity, (3,)))
+        a1, a2, a3, a4, a5 = (float(a) for a in self.lengths)
+        gamma = _add_link(model, 0, "gamma", a5, self._body(4), "link4")
+        phi = _add_link(model, gamma, "phi_gamma", a4, self._body(3), "link3")
+        psi = _add_link(model, 0, "psi", 0.0, self._body(1), "link1")
+        theta = _add_link(model, psi, "theta_psi", a1, self._body(2), "link2")
+        _add_point(model, theta, "O3_link2", a2, "link2")
+        _add_point(model, phi, "O3_link3", a3, "link3")
+        closure = Closure(("O3_link2", "O3_link3"), ClosureKind.POINT, name="O3")
+        return ClosedChain(model, (closure,), ("psi", "gamma"), name="five_bar", visuals=_visuals(self.lengths))
+
+    def configuration(
+        self, psi: npt.ArrayLike, gamma: npt.ArrayLike, *, mode: AssemblyMode = AssemblyMode.LEFT
+    ) -> Array:
+        """Return the configuration of `chain` in which the loop is closed.
+
+        Args:
+            psi, gamma: input angles, scalars or (n,) [rad].
+            mode: which of the two closures.
+
+        Returns:
+            q = (gamma, phi - gamma, psi, theta - psi), (4,) or (n, 4) [rad]; theta and phi in (-pi, pi].
+
+        Raises:
+            AssemblyError: the loop cannot be closed (which sample, and by how much).
+            SingularityError: O2, O3 and O4 lie on a line.
+        """
+        from fivebar_pin.paper.kinematics import position
+
+        single = np.ndim(psi) == 0 and np.ndim(gamma) == 0
+        x = checked("psi", np.atleast_1d(np.asarray(psi, dtype=np.float64)), (None,))
+        y = checked("gamma", np.atleast_1d(np.asarray(gamma, dtype=np.float64)), x.shape)
+        pose = position(self, x, y, mode=mode)
+        q = np.stack([y, pose.phi - y, x, pose.theta - x], axis=-1)
+        return np.asarray(q[0] if single else q)
+
+    def _body(self, link: int) -> pin.Inertia:
+        c, inertia = complex(self.offsets[link - 1]), float(self.inertias[link - 1])
+        spread = np.diag([0.5 * inertia, 0.5 * inertia, inertia])
+        return pin.Inertia(float(self.masses[link - 1]), np.array([c.real, c.imag, 0.0]), spread)
+
+
+# Table 1 of the paper: |r_12|, |r_23|, |r_34|, |r_40|, |r_01|; masses; inertias; rho; alpha. The paper has no row for
+# |r_12|: the unbalanced inertias are those of uniform rods, I = m a^2 / 12, which gives 0.02 m and 0.035 m.
+_TABLE_1: dict[str, dict[str, tuple[tuple[float, ...], ...]]] = {
+    "I": {
+        "unbalanced": (
+            (0.02, 0.1, 0.1, 0.04, 0.04),
+            (0.03, 0.15, 0.15, 0.06),
+            (1e-6, 1.25e-4, 1.25e-4, 8e-6),
+            (0.5, 0.5, 0.5, 0.5),
+            (0.0, 0.0, 0.0, 0.0),
+        ),
+        "balanced": (
+            (0.02, 0.1, 0.1, 0.04, 0.04),
+            (0.04, 0.14, 0.14, 0.08),
+            (1.333e-6, 2.1666e-4, 1.6166e-4, 1.066e-5),
+            (0.22, 0.8372, 0.5872, 1.64),
+            (0.0, 0.0, 0.0, 0.0),
+        ),
+    },
+    "II": {
+        "unbalanced": (
+            (0.035, 0.08, 0.1, 0.03, 0.05),
+            (0.02, 0.2, 0.25, 0.05),
+            (2.041e-6, 1.06e-4, 2.08e-4, 3.75e-6),
+            (0.5, 0.5, 0.5, 0.5),
+            (0.0, 0.0, 0.0, 0.0),
+        ),
+        "balanced": (
+            (0.035, 0.08, 0.1, 0.03, 0.05),
+            (0.03, 0.024, 0.031, 0.075),
+            (1.6e-5, 1.69e-4, 3.6e-4, 1.72e-5),
+            (0.16, 0.0753, 0.0627, 1.373),
+            (0.0, 0.012, 0.065, 0.0),
+        ),
+    },
+}
+_CORRECTED_MASSES = (0.03, 0.24, 0.31, 0.075)  # case II balanced, if 0.024 and 0.031 are slips
+
+
+def table_1(case: str, column: str, *, reading: str = "printed") -> FiveBar:
+    """Return a column of the paper's Table 1, with |r_12| supplied (the table has no row for it).
+
+    The printed "balanced" columns do not satisfy the balancing conditions; see `audit_table_1`.
+
+    Args:
+        case: "I" or "II".
+        column: "unbalanced" or "balanced".
+        reading: "printed", or "corrected": m2 = 0.24 and m3 = 0.31 kg in place of 0.024 and 0.031 in the balanced
+            column of case II. The other columns read the same either way.
+
+    Raises:
+        UnknownNameError: a case, column or reading that does not exist.
+    """
+    for kind, name, known in (
+        ("case", case, tuple(_TABLE_1)),
+        ("column", column, tuple(_TABLE_1["I"])),
+        ("reading", reading, ("printed", "corrected")),
+    ):
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    lengths, masses, inertias, rho, alpha = _TABLE_1[case][column]
+    if (case, column, reading) == ("II", "balanced", "corrected"):
+        masses = _CORRECTED_MASSES
+    return FiveBar(lengths, masses, inertias, rho, alpha)
+
+
+def default_motion(*, samples: int = 201, period: float = 1.0) -> Motion:
+    """Return the motion used where none is given: link 1 turns once, link 4 swings.
+
+    psi runs from 0 to 2 pi along a cycloid and gamma = pi/3 + (pi/6)(1 - cos(2 pi t / period)). The paper names the
+    two laws but its curves are lost; these values are this library's.
+
+    Args:
+        samples: number of instants over [0, period], both ends included.
+        period: duration [s].
+    """
+    if not isinstance(samples, (int, np.integer)) or samples < 2:
+        raise InvalidInputError("samples", samples, "must be an integer of at least 2")
+    if not (np.isfinite(period) and period > 0.0):
+        raise InvalidInputError("period", period, "must be positive and finite [s]")
+    t = np.linspace(0.0, period, int(samples))
+    psi = laws.cycloidal(t, 0.0, 2.0 * np.pi, duration=period)
+    return laws.combine(psi, laws.harmonic(t, np.pi / 2.0, -np.pi / 6.0, period=period))
+
+
+def _all_positive(name: str, values: Array, bound: str) -> None:
+    for k in np.flatnonzero(values <= 0.0):
+        raise InvalidInputError(f"{name}[{k}]", float(values[k]), bound)
+
+
+def _add_link(model: pin.Model, parent: int, joint: str, x: float, body: pin.Inertia, link: str) -> int:
+    """Add a hinge about z at x on the parent's x axis, and the body that it carries."""
+    limit, far = np.full(1, 1e6), np.full(1, _WIDE)
+    placement = pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
+    index = int(model.addJoint(parent, pin.JointModelRZ(), placement, joint, limit, limit, -far, far))
+    model.appendBodyToJoint(index, body, pin.SE3.Identity())
+    frame = model.addJointFrame(index)
+    model.addBodyFrame(link, index, pin.SE3.Identity(), int(frame))
+    return index
+
+
+def _add_point(model: pin.Model, joint: int, name: str, x: float, link: str) -> None:
+    placement = pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
+    frame = pin.Frame(name, joint, model.getFrameId(link), placement, pin.FrameType.OP_FRAME)
+    model.addFrame(frame)
+
+
+def _visuals(lengths: Array) -> tuple[Visual, ...]:
+    """Return a capsule along each link and a pin at its far end; the radii follow the mean link length."""
+    radius = 0.04 * float(np.mean(lengths[:4]))
+    visuals = []
+    for k, colour in enumerate(_COLOURS):
+        length = float(lengths[k])
+        along = np.array([[0.0, 0.0, 1.0, 0.5 * length], [0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0, 0, 0, 1.0]])
+        pivot = np.eye(4)
+        pivot[0, 3] = length
+        visuals.append(Visual(f"link{k + 1}", "capsule", (radius, length), frozen(along), (*colour, 1.0)))
+        pin_size = (1.25 * radius, 3.0 * radius)
+        visuals.append(Visual(f"link{k + 1}", "cylinder", pin_size, frozen(pivot), (0.2, 0.2, 0.22, 1.0)))
+    return tuple(visuals)
