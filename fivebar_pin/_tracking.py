@@ -1,0 +1,217 @@
+"""Following an assembly mode along a motion: a few careful steps first, all samples in between at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fivebar_pin._arrays import Array
+from fivebar_pin._loops import Loops, open_message
+from fivebar_pin._newton import Closed, closed_enough, polish, residual_of, search
+from fivebar_pin.errors import AssemblyError, BranchError, SingularityError
+
+LONGEST = 0.4  # longest predictor step of any coordinate [rad, or chain lengths]
+SINGULAR = 1e-7  # scaled smallest singular value below which the passive motion counts as undetermined [-]
+_SHORTEST = 1e-7  # fraction of a step below which the search for a way on is given up
+_TRUST = 0.3  # largest correction, as a fraction of the step that was predicted
+
+
+@dataclass(slots=True)
+class _Node:
+    """A closed configuration on the branch, and how the passive coordinates move on from it."""
+
+    x: Array  # actuated coordinates (na,)
+    q: Array  # (nq,)
+    N: Array  # (np, na)
+    sign: float
+    sigma: float
+
+
+def node_at(loops: Loops, q: Array, x: Array) -> _Node:
+    """Prepare a closed configuration q (nq,) with actuated coordinates x (na,)."""
+    poses = loops.tree.poses(q[None])
+    J = loops.jacobian(poses, loops.pairs(poses))
+    passive = loops.passive_map(J)
+    N = -np.matmul(passive.X, np.matmul(loops.reduce, J[:, :, loops.actuated]))[0]
+    return _Node(np.array(x), np.array(q), N, float(passive.sign[0]), float(passive.sigma[0]))
+
+
+def follow(loops: Loops, node: _Node, target: Array, tolerance: float) -> _Node:
+    """Go from one node to the actuated coordinates `target` (na,) along the straight line, on the same branch.
+
+    Raises:
+        SingularityError, AssemblyError: the way is blocked; without sample and time.
+    """
+    done, step = 0.0, 1.0
+    start = node.x
+    while done < 1.0:
+        step = min(step, 1.0 - done)
+        x = start + (done + step) * (target - start)
+        reached = _try(loops, node, x, tolerance)
+        if reached is None:
+            step *= 0.5
+            if step < _SHORTEST:
+                raise _blocked(loops, node, x)
+            continue
+        node, done = reached, done + step
+        step *= 2.0
+    return node
+
+
+def track(loops: Loops, q0: Array, X: Array, tolerance: float) -> Closed:
+    """Follow the branch of q0 along all samples.
+
+    Args:
+        q0: closed configuration at X[0] (nq,).
+        X: actuated coordinates (n, na).
+        tolerance: closure residual counted as closed [m or rad, times the chain's length above 1 m].
+
+    Returns:
+        Closed configurations at every sample.
+
+    Raises:
+        AssemblyError, BranchError, SingularityError: with an attribute `sample` at the first sample not reached.
+    """
+    n = X.shape[0]
+    node = node_at(loops, q0, X[0])
+    if node.sigma < SINGULAR:
+        raise _located(_singular(node.sigma), 0)
+    path = np.r_[0.0, np.cumsum(np.abs(np.diff(X, axis=0)).max(axis=1))] if X.shape[1] else np.zeros(n)
+    index, nodes = [0], [node]
+    reach = 0.5 * LONGEST
+    while index[-1] < n - 1:
+        i = index[-1]
+        k = min(n - 1, max(i + 1, int(np.searchsorted(path, path[i] + reach, side="right")) - 1))
+        reached = _try(loops, nodes[-1], X[k], tolerance)
+        if reached is None and k > i + 1:
+            reach *= 0.5
+            continue
+        if reached is None:
+            try:
+                reached = follow(loops, nodes[-1], X[k], tolerance)
+            except (AssemblyError, SingularityError) as error:
+                raise _located(error, k) from None
+        else:
+            reach = min(1.5 * reach, 4.0 * LONGEST)
+        index.append(k)
+        nodes.append(reached)
+    return _fill(loops, np.array(index), nodes, X, tolerance)
+
+
+def _try(loops: Loops, node: _Node, x: Array, tolerance: float) -> _Node | None:
+    """Take one predictor-corrector step; None when it is not clearly on the same branch."""
+    dx = x - node.x
+    tangent = np.zeros(loops.tree.nv)
+    tangent[loops.actuated], tangent[loops.passive] = dx, node.N @ dx
+    size = float(np.abs(tangent / loops.column_scale).max(initial=0.0))
+    if not size <= LONGEST:
+        return None
+    guess = loops.tree.integrate(node.q[None], tangent[None])
+    _set_actuated(loops, guess, x[None])
+    closed = polish(loops, guess)
+    if not closed_enough(loops, closed.residual, tolerance)[0] or closed.correction[0] > _TRUST * size + 1e-9:
+        return None
+    reached = node_at(loops, closed.q[0], x)
+    if reached.sign != node.sign or reached.sigma < SINGULAR:
+        return None
+    return reached
+
+
+def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, tolerance: float) -> Closed:
+    """Close every sample between the nodes at once, starting from a cubic through the nodes on either side."""
+    n = X.shape[0]
+    guess = _between(loops, index, nodes, X)
+    sign = nodes[0].sign
+    closed = polish(loops, guess)
+    trusted = closed_enough(loops, closed.residual, tolerance) & (closed.sign == sign) & (closed.sigma >= SINGULAR)
+    trusted &= closed.correction <= _TRUST * LONGEST
+    if trusted.all():
+        return closed
+    return _mend(loops, index, nodes, X, closed, trusted, tolerance) if n else closed
+
+
+def _mend(
+    loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, closed: Closed, trusted: np.ndarray, tolerance: float
+) -> Closed:
+    """Redo, sample by sample, the stretches between nodes where something looked wrong."""
+    bad = np.unique(np.searchsorted(index, np.flatnonzero(~trusted), side="right") - 1)
+    parts = {name: np.array(getattr(closed, name)) for name in Closed.__slots__}
+    for b in bad:
+        node = nodes[b]
+        for k in range(index[b], index[b + 1] + 1 if b + 1 < index.size else index[b] + 1):
+            try:
+                node = follow(loops, node, X[k], tolerance)
+            except (AssemblyError, SingularityError) as error:
+                raise _located(error, k) from None
+            again = polish(loops, node.q[None])
+            for name, values in parts.items():
+                values[k] = getattr(again, name)[0]
+        if b + 1 < index.size and _apart(loops, node.q, nodes[b + 1].q):
+            raise _located(
+                BranchError(
+                    "the motion passes another assembly mode between two samples; refine the motion",
+                    closure=loops.closures[0].name,
+                    residual=0.0,
+                ),
+                int(index[b + 1]),
+            )
+    return Closed(**parts)
+
+
+def _between(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array) -> Array:
+    """Interpolate configurations at every sample from the nodes: cubic along the chord, linear across it."""
+    n = X.shape[0]
+    Q = np.stack([node.q for node in nodes])
+    if len(nodes) == 1:
+        return np.repeat(Q, n, axis=0)
+    b = np.minimum(np.searchsorted(index, np.arange(n), side="right") - 1, index.size - 2)
+    XN, N = X[index], np.stack([node.N for node in nodes])
+    chord = XN[b + 1] - XN[b]
+    length2 = np.maximum(np.einsum("ni,ni->n", chord, chord), 1e-300)
+    s = np.clip(np.einsum("ni,ni->n", X - XN[b], chord) / length2, 0.0, 1.0)[:, None]
+    span = loops.tree.difference(Q[:-1], Q[1:])[b][:, loops.passive]
+    m0, m1 = (np.einsum("npa,na->np", N[b + k], chord) for k in (0, 1))
+    off = X - XN[b] - s * chord
+    across = (1.0 - s) * np.einsum("npa,na->np", N[b], off) + s * np.einsum("npa,na->np", N[b + 1], off)
+    tangent = np.zeros((n, loops.tree.nv))
+    tangent[:, loops.passive] = (
+        s * s * (3.0 - 2.0 * s) * span + s * (1.0 - s) ** 2 * m0 - s * s * (1.0 - s) * m1 + across
+    )
+    guess = loops.tree.integrate(Q[b], tangent)
+    _set_actuated(loops, guess, X)
+    return guess
+
+
+def _set_actuated(loops: Loops, q: Array, x: Array) -> None:
+    for column, k in enumerate(loops.actuated):
+        loops.tree.set_coordinate(q, int(k), x[:, column])
+
+
+def _apart(loops: Loops, q0: Array, q1: Array) -> bool:
+    d = loops.tree.difference(q0[None], q1[None])[0] / loops.column_scale
+    return bool(np.abs(d).max(initial=0.0) > 1e-6)
+
+
+def _blocked(loops: Loops, node: _Node, x: Array) -> AssemblyError | SingularityError:
+    """Say why there is no way on from a node towards x: out of reach, or a singularity in between."""
+    q = np.array(node.q[None])
+    _set_actuated(loops, q, x[None])
+    found = search(loops, q)
+    residual = residual_of(loops, found)[0]
+    if np.abs(residual).max(initial=0.0) > 1e-8 * max(1.0, loops.length):
+        return open_message(loops, residual, "at these actuated coordinates")
+    return _singular(node.sigma)
+
+
+def _singular(sigma: float) -> SingularityError:
+    return SingularityError(
+        "the motion meets a type 2 singularity: the actuated joints do not determine the passive ones there "
+        f"(smallest scaled singular value {sigma:.2g}). Choose a motion that keeps away from it.",
+        sigma=sigma,
+    )
+
+
+def _located(error: AssemblyError | SingularityError, sample: int) -> AssemblyError | SingularityError:
+    error.sample = sample
+    return error

@@ -1,0 +1,300 @@
+"""Constrained kinematics: assemble, drive, complement.
+
+With the closure rows c(q) = 0, J = dc/dq and the coordinates split into actuated and passive,
+
+    J_a v_a + J_p v_p = 0      =>   v = N v_a,   N = [1; -J_p^+ J_a],   J N = 0
+    J a + (dJ/dt) v = 0        =>   a_p = -J_p^+ (J_a a_a + (dJ/dt) v)
+
+N is the natural orthogonal complement written in the joint coordinates of the tree [Angeles and Lee 1988].
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, checked
+from fivebar_pin._loops import Loops, loops_of, open_message
+from fivebar_pin._newton import closed_enough, polish, residual_of, search
+from fivebar_pin._tracking import SINGULAR, follow, node_at, track
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
+from fivebar_pin.motion import Motion
+from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["assemble", "assembly_modes", "closure_residual", "complement", "drive"]
+
+CLOSED = 1e-12  # closure residual that counts as closed [m or rad]
+_BLOCK = 4096  # samples worked on at a time, so that intermediate arrays stay in cache
+
+
+def assemble(
+    chain: ClosedChain,
+    q_actuated: npt.ArrayLike,
+    near: npt.ArrayLike | None = None,
+    *,
+    starts: int = 64,
+    seed: int = 0,
+    tolerance: float = CLOSED,
+) -> Array:
+    """Find the configuration that closes all loops for given actuated coordinates.
+
+    Args:
+        chain: the mechanism.
+        q_actuated: actuated coordinates (na,) or (n, na), order of `chain.actuated` [rad or m].
+        near: a configuration (nq,). When it is itself closed, its assembly mode is followed from there along the
+            straight line of actuated coordinates; otherwise a damped, step-limited search starts at it.
+            Without it the neutral and then random configurations are tried.
+        starts: number of random starts when `near` is not given.
+        seed: of the random starts.
+        tolerance: closure residual to reach [m or rad; relative to the chain's length above 1 m].
+
+    Returns:
+        The configuration (nq,) or (n, nq).
+
+    Raises:
+        AssemblyError: the loops do not close; names the closure that stays open and by how much.
+        SingularityError: the way from `near` is blocked by a singularity.
+    """
+    loops = loops_of(chain)
+    loops.require_determined()
+    x = np.asarray(q_actuated, dtype=np.float64)
+    if x.ndim == 2:
+        each = [assemble(chain, row, near, starts=starts, seed=seed, tolerance=tolerance) for row in x]
+        return np.stack(each) if each else np.zeros((0, chain.nq))
+    x = checked("q_actuated", x, (chain.na,))
+    if near is not None:
+        return _assemble_near(loops, x, checked("near", near, (chain.nq,)), tolerance)
+    q, residual = _closed_from_starts(chain, loops, x, starts, seed, tolerance)
+    if not q.shape[0]:
+        raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")
+    return np.asarray(q[0])
+
+
+def assembly_modes(
+    chain: ClosedChain,
+    q_actuated: npt.ArrayLike,
+    *,
+    starts: int = 128,
+    seed: int = 0,
+    tolerance: float = CLOSED,
+) -> Array:
+    """List the distinct closed configurations found for given actuated coordinates.
+
+    A random search: it finds what its starts lead to, which for the usual planar linkages is every mode.
+
+    Returns:
+        Configurations (k, nq), ordered by their coordinates; a five-bar has two. Empty when nothing closes.
+    """
+    loops = loops_of(chain)
+    loops.require_determined()
+    x = checked("q_actuated", q_actuated, (chain.na,))
+    q, _ = _closed_from_starts(chain, loops, x, starts, seed, tolerance)
+    modes: list[Array] = []
+    for candidate in q:
+        poses = loops.tree.poses(candidate[None])
+        if not any(_same_pose(loops, poses, mode) for mode in modes):
+            modes.append(candidate)
+    modes.sort(key=lambda c: tuple(np.round(c, 9)))
+    return np.stack(modes) if modes else np.zeros((0, chain.nq))
+
+
+def drive(
+    chain: ClosedChain,
+    motion: Motion,
+    near: npt.ArrayLike | None = None,
+    *,
+    tolerance: float = CLOSED,
+    limits: Literal["check", "ignore"] = "check",
+) -> Trajectory:
+    """Move the whole mechanism from the motion of its actuated joints, on one assembly mode.
+
+    Args:
+        chain: the mechanism.
+        motion: of the actuated joints, columns in the order of `chain.actuated`.
+        near: configuration (nq,) that picks the assembly mode, see `assemble`.
+        tolerance: closure residual to reach [m or rad; relative to the chain's length above 1 m].
+        limits: whether the joint limits of the model are checked.
+
+    Returns:
+        q, v, a of all joints, consistent with each other, the complement N and the closure residual.
+
+    Raises:
+        AssemblyError: a sample out of reach; names sample, time, closure and gap.
+        BranchError: the motion cannot be followed without changing the assembly mode.
+        SingularityError: the motion meets a type 2 singularity; names sample and time.
+        InvalidInputError: motion of the wrong width, joint limits passed, motion left undetermined.
+    """
+    loops = loops_of(chain)
+    loops.require_determined()
+    if motion.na != chain.na:
+        raise InvalidInputError(
+            "motion columns", motion.na, f"must be {chain.na}, one for each of {', '.join(chain.actuated)}"
+        )
+    try:
+        q0 = assemble(chain, motion.q[0], near, tolerance=tolerance)
+        closed = track(loops, q0, motion.q, tolerance)
+    except (AssemblyError, SingularityError) as error:
+        raise _with_time(error, motion) from None
+    if limits == "check":
+        _check_limits(chain, closed.q, motion)
+    parts = [
+        _consistent(loops, closed.q[k : k + _BLOCK], motion.v[k : k + _BLOCK], motion.a[k : k + _BLOCK])
+        for k in range(0, len(motion), _BLOCK)
+    ]
+    v, a, N = (np.concatenate(x) if len(parts) > 1 else x[0] for x in zip(*parts, strict=True))
+    return Trajectory(motion.t, closed.q, v, a, N, closed.residual)
+
+
+def complement(chain: ClosedChain, q: npt.ArrayLike) -> Array:
+    """Return the complement N of the closure Jacobian: v = N v_actuated and J N = 0.
+
+    Args:
+        chain: the mechanism.
+        q: closed configuration (nq,) or (n, nq).
+
+    Returns:
+        N (nv, na) or (n, nv, na), rows in Pinocchio's order, columns in the order of `chain.actuated`.
+
+    Raises:
+        SingularityError: the actuated joints do not determine the motion at q.
+    """
+    loops = loops_of(chain)
+    loops.require_determined()
+    single = np.ndim(q) == 1
+    Q = checked("q", np.atleast_2d(np.asarray(q, dtype=np.float64)), (None, chain.nq))
+    poses = loops.tree.poses(Q)
+    N, sigma = _complement(loops, loops.jacobian(poses, loops.pairs(poses)))
+    _require_regular(sigma)
+    return np.asarray(N[0]) if single else N
+
+
+def closure_residual(chain: ClosedChain, q: npt.ArrayLike) -> Array:
+    """Return every closure row at q: (nq,) -> (m,) or (n, nq) -> (n, m) [m, rad], axes of frame 1."""
+    loops = loops_of(chain)
+    single = np.ndim(q) == 1
+    Q = checked("q", np.atleast_2d(np.asarray(q, dtype=np.float64)), (None, chain.nq))
+    if not loops.m:
+        return np.zeros((0,) if single else (Q.shape[0], 0))
+    residual = residual_of(loops, Q)
+    return np.asarray(residual[0]) if single else residual
+
+
+def _consistent(loops: Loops, q: Array, va: Array, aa: Array) -> tuple[Array, Array, Array]:
+    """Return v, a (n, nv) and N (n, nv, na) from the actuated rates."""
+    poses = loops.tree.poses(q)
+    pairs = loops.pairs(poses)
+    J = loops.jacobian(poses, pairs)
+    passive = loops.passive_map(J)
+    N = _assembled_complement(loops, J, passive.X)
+    v = np.matmul(N, va[..., None])[..., 0]
+    a = np.matmul(N, aa[..., None])[..., 0]
+    if loops.m:
+        drift = loops.drift(pairs, loops.tree.rates(q, v, poses)) @ loops.reduce.T
+        a[:, loops.passive] -= np.matmul(passive.X, drift[..., None])[..., 0]
+    return v, a, N
+
+
+def _complement(loops: Loops, J: Array) -> tuple[Array, Array]:
+    passive = loops.passive_map(J)
+    return _assembled_complement(loops, J, passive.X), passive.sigma
+
+
+def _assembled_complement(loops: Loops, J: Array, X: Array) -> Array:
+    N = np.zeros((J.shape[0], loops.tree.nv, loops.actuated.size))
+    N[:, loops.actuated, np.arange(loops.actuated.size)] = 1.0
+    if loops.m:
+        N[:, loops.passive] = -np.matmul(X, np.matmul(loops.reduce, J[:, :, loops.actuated]))
+    return N
+
+
+def _require_regular(sigma: Array) -> None:
+    worst = int(np.argmin(sigma)) if sigma.size else 0
+    if sigma.size and sigma[worst] < SINGULAR:
+        raise SingularityError(
+            f"configuration {worst} is at a type 2 singularity: the actuated joints do not determine the passive ones "
+            f"(smallest scaled singular value {sigma[worst]:.2g}, must be above {SINGULAR:g})",
+            sigma=float(sigma[worst]),
+            sample=worst,
+        )
+
+
+def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Array:
+    q = np.array(near[None])
+    if closed_enough(loops, np.abs(residual_of(loops, q)).max(axis=1, initial=0.0), 1e-8)[0] if loops.m else False:
+        at = np.array([loops.tree.coordinate(q, int(k))[0] for k in loops.actuated])
+        node = node_at(loops, q[0], at)
+        if node.sigma >= SINGULAR:
+            q = polish(loops, follow(loops, node, x, tolerance).q[None]).q
+            _write_actuated(loops, q, x)
+            return np.asarray(q[0])
+    _write_actuated(loops, q, x)
+    if not loops.m:
+        return np.asarray(q[0])
+    closed = polish(loops, search(loops, q))
+    if not closed_enough(loops, closed.residual, tolerance)[0] or loops.opposed(loops.pairs(loops.tree.poses(closed.q)))[0]:
+        raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
+    return np.asarray(closed.q[0])
+
+
+def _closed_from_starts(
+    chain: ClosedChain, loops: Loops, x: Array, starts: int, seed: int, tolerance: float
+) -> tuple[Array, Array]:
+    """Return the closed configurations (k, nq) reached from several starts, and the smallest residual (m,)."""
+    import pinocchio as pin
+
+    rng = np.random.default_rng(seed)
+    tangent = rng.uniform(-np.pi, np.pi, (starts, loops.tree.nv)) * loops.column_scale
+    tangent[0] = 0.0
+    q = loops.tree.integrate(np.repeat(pin.neutral(chain.model)[None], starts, axis=0), tangent)
+    _write_actuated(loops, q, x)
+    if not loops.m:
+        return q[:1], np.zeros(0)
+    closed = polish(loops, search(loops, q))
+    pairs = loops.pairs(loops.tree.poses(closed.q))
+    good = closed_enough(loops, closed.residual, tolerance) & ~loops.opposed(pairs)
+    residual = loops.residual(pairs)
+    best = int(np.argmin(np.abs(residual).max(axis=1)))
+    return closed.q[good], residual[best]
+
+
+def _same_pose(loops: Loops, poses: object, other: Array) -> bool:
+    """Whether two configurations place every body alike (angles that differ by whole turns do)."""
+    from fivebar_pin._tree import Poses
+
+    assert isinstance(poses, Poses)
+    b = loops.tree.poses(other[None])
+    near = 1e-6
+    return all(np.abs(r - s).max() < near for r, s in zip(poses.R, b.R, strict=True)) and all(
+        np.abs(r - s).max() < near * loops.length for r, s in zip(poses.p, b.p, strict=True)
+    )
+
+
+def _write_actuated(loops: Loops, q: Array, x: Array) -> None:
+    for column, k in enumerate(loops.actuated):
+        loops.tree.set_coordinate(q, int(k), np.full(q.shape[0], x[column]))
+
+
+def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
+    lower, upper = chain.model.lowerPositionLimit, chain.model.upperPositionLimit
+    slack = 1e-9
+    bad = np.argwhere((q < lower - slack) | (q > upper + slack))
+    if bad.size:
+        k, i = (int(b) for b in bad[0])
+        owner = next(j for j in range(1, chain.model.njoints) if chain.model.idx_qs[j] <= i < chain.model.idx_qs[j] + chain.model.nqs[j])
+        raise InvalidInputError(
+            f"joint {chain.model.names[owner]} at sample {k} (t = {motion.t[k]:.6g} s)",
+            float(q[k, i]),
+            f"must stay within its limits [{lower[i]:.6g}, {upper[i]:.6g}]",
+            "Change the motion, or pass limits='ignore'.",
+        )
+
+
+def _with_time(error: AssemblyError | SingularityError, motion: Motion) -> AssemblyError | SingularityError:
+    """Say at which sample and time it happened."""
+    k = error.sample if error.sample is not None else 0
+    error.sample, error.time = k, float(motion.t[k])
+    error.args = (f"sample {k} (t = {motion.t[k]:.6g} s): {error.args[0]}",)
+    return error
