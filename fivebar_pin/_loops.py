@@ -64,13 +64,13 @@ class Loops:
         self.closures = chain.closures
         self.actuated, self.passive = chain.actuated_index, chain.passive_index
         self.length = chain.length
-        self._anchored: list[_Anchored] = []
+        self.anchored: list[_Anchored] = []
         start = 0
         for closure in chain.closures:
             frames = [model.frames[model.getFrameId(f)] for f in closure.frames]
             i, j = (int(f.parentJoint) for f in frames)
             sign = self.tree.support[j].astype(float) - self.tree.support[i].astype(float)
-            self._anchored.append(
+            self.anchored.append(
                 _Anchored(
                     closure,
                     (i, j),
@@ -98,7 +98,7 @@ class Loops:
     def pairs(self, poses: Poses) -> list[FramePair]:
         """Return the world poses of the frames of every closure."""
         out = []
-        for c in self._anchored:
+        for c in self.anchored:
             (i, j), (Ri, Rj), (pi, pj) = c.joints, c.R, c.p
             out.append(
                 FramePair(
@@ -112,12 +112,12 @@ class Loops:
 
     def residual(self, pairs: list[FramePair]) -> Array:
         """Return all closure rows (n, m) [m, rad]."""
-        return np.concatenate([rows.residual(c.closure, x) for c, x in zip(self._anchored, pairs, strict=True)], axis=1)
+        return np.concatenate([rows.residual(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
 
     def jacobian(self, poses: Poses, pairs: list[FramePair]) -> Array:
         """Return the closure Jacobian J (n, m, nv): residual rate = J v."""
         J = np.zeros((poses.S.shape[0], self.m, self.tree.nv))
-        for c, pair in zip(self._anchored, pairs, strict=True):
+        for c, pair in zip(self.anchored, pairs, strict=True):
             block = np.matmul(rows.selector(c.closure, pair), poses.S[:, :, c.moved] * c.sign[c.moved])
             J[:, c.rows, c.moved] = block
         return J
@@ -127,14 +127,14 @@ class Loops:
         return np.concatenate(
             [
                 rows.drift(c.closure, x, *(rates.V[j] for j in c.joints), *(rates.A[j] for j in c.joints))
-                for c, x in zip(self._anchored, pairs, strict=True)
+                for c, x in zip(self.anchored, pairs, strict=True)
             ],
             axis=1,
         )
 
     def opposed(self, pairs: list[FramePair]) -> npt.NDArray[np.bool_]:
         """Return where some hinge closes with its axes against each other (n,)."""
-        flags = [rows.opposed(c.closure, x) for c, x in zip(self._anchored, pairs, strict=True)]
+        flags = [rows.opposed(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)]
         return np.asarray(np.any(flags, axis=0))
 
     def passive_map(self, J: Array) -> PassiveMap:
@@ -170,9 +170,9 @@ class Loops:
 
     def worst(self, residual: Array) -> tuple[str, float]:
         """Return the closure that one residual (m,) leaves open the most, and by how much."""
-        sizes = [float(np.max(np.abs(residual[c.rows]))) for c in self._anchored]
+        sizes = [float(np.max(np.abs(residual[c.rows]))) for c in self.anchored]
         k = int(np.argmax(sizes))
-        return self._anchored[k].closure.name, sizes[k]
+        return self.anchored[k].closure.name, sizes[k]
 
     def require_determined(self) -> None:
         """Raise unless the actuated joints can determine the motion."""

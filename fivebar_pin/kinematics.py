@@ -97,7 +97,7 @@ def assembly_modes(
         poses = loops.tree.poses(candidate[None])
         if not any(_same_pose(loops, poses, mode) for mode in modes):
             modes.append(candidate)
-    modes.sort(key=lambda c: tuple(np.round(c, 9)))
+    modes.sort(key=lambda c: np.round(c, 9).tolist())
     return np.stack(modes) if modes else np.zeros((0, chain.nq))
 
 
@@ -234,7 +234,10 @@ def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Arr
     if not loops.m:
         return np.asarray(q[0])
     closed = polish(loops, search(loops, q))
-    if not closed_enough(loops, closed.residual, tolerance)[0] or loops.opposed(loops.pairs(loops.tree.poses(closed.q)))[0]:
+    if (
+        not closed_enough(loops, closed.residual, tolerance)[0]
+        or loops.opposed(loops.pairs(loops.tree.poses(closed.q)))[0]
+    ):
         raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
     return np.asarray(closed.q[0])
 
@@ -283,7 +286,7 @@ def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
     bad = np.argwhere((q < lower - slack) | (q > upper + slack))
     if bad.size:
         k, i = (int(b) for b in bad[0])
-        owner = next(j for j in range(1, chain.model.njoints) if chain.model.idx_qs[j] <= i < chain.model.idx_qs[j] + chain.model.nqs[j])
+        owner = int(np.searchsorted(np.array(chain.model.idx_qs)[1:], i, side="right"))
         raise InvalidInputError(
             f"joint {chain.model.names[owner]} at sample {k} (t = {motion.t[k]:.6g} s)",
             float(q[k, i]),
