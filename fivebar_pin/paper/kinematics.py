@@ -43,8 +43,8 @@ def links(
     mode: AssemblyMode = AssemblyMode.LEFT,
     times: Array | None = None,
     first: int = 0,
-) -> tuple[CArray, Array]:
-    """Return the link vectors b (4, n) [m] and X = Im(conj(b2) b3) (n,) [m2].
+) -> tuple[CArray, Array, Array]:
+    """Return the link vectors b (4, n) [m], X = Im(conj(b2) b3) (n,) [m2] and D = |O2 O4|^2 (n,) [m2].
 
     Args:
         linkage: the linkage.
@@ -85,7 +85,7 @@ def links(
     turn /= D
     np.multiply(d, turn, out=b2)
     np.subtract(b2, d, out=b3)
-    return b, X
+    return b, X, D
 
 
 def position(
@@ -97,20 +97,21 @@ def position(
     times: Array | None = None,
 ) -> Pose:
     """Return theta and phi from psi and gamma, (2)-(7), with the branch of (7) kept by atan2; see `links`."""
-    b, X = links(linkage, psi, gamma, mode=mode, times=times)
+    b, X, _ = links(linkage, psi, gamma, mode=mode, times=times)
     return Pose(np.angle(b[1]), np.angle(b[2]), b, X)
 
 
-def partials(b: CArray, X: Array) -> Array:
+def partials(b: CArray, X: Array, *, out: Array | None = None) -> Array:
     """Return P (2, 2, n): [[theta_psi, theta_gamma], [phi_psi, phi_gamma]], partial derivatives of the passive angles.
 
     From b2 theta' - b3 phi' = b4 gamma' - b1 psi': theta_psi = Im(conj(b3) b1) / X, and so on. The paper's ratios are
     r_theta = theta_psi + theta_gamma r_gamma, r_phi = phi_psi + phi_gamma r_gamma; these never divide by psi'.
     """
-    P = (np.conj(b[2:0:-1])[:, None, :] * b[::3][None, :, :]).imag
-    P[:, 0] /= X
-    P[:, 1] /= -X
-    return np.asarray(P)
+    cross = (np.conj(b[2:0:-1])[:, None, :] * b[::3]).imag
+    P = np.empty_like(cross) if out is None else out
+    np.divide(cross[:, 0], X, out=P[:, 0])
+    np.divide(cross[:, 1], -X, out=P[:, 1])
+    return P
 
 
 def passive_acceleration(b: CArray, X: Array, P: Array, rates: Array, driven: Array) -> Array:

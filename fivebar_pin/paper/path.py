@@ -25,7 +25,7 @@ _HERMITE = np.array(
 )
 
 
-def check_path(linkage: FiveBar, t: Array, q: Array, v: Array, a: Array) -> None:
+def check_path(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], reach: Array) -> None:
     """Raise when the motion passes a singularity between two samples.
 
     O2, O3, O4 lie on a line where the distance |O2 O4| reaches a2 + a3 or |a2 - a3|. Intervals that could get there at
@@ -34,7 +34,8 @@ def check_path(linkage: FiveBar, t: Array, q: Array, v: Array, a: Array) -> None
     Args:
         linkage: the linkage.
         t: times (n,) [s].
-        q, v, a: of psi and gamma (2, n).
+        driven: q, v, a of psi and gamma, each (2, n).
+        reach: |O2 O4| at the samples (n,) [m].
 
     Raises:
         SingularityError: which interval.
@@ -43,16 +44,16 @@ def check_path(linkage: FiveBar, t: Array, q: Array, v: Array, a: Array) -> None
         return
     low, high = _bounds(linkage)
     a1, a4 = float(linkage.lengths[0]), float(linkage.lengths[3])
-    speed = a4 * np.abs(v[1])
-    speed += a1 * np.abs(v[0])
-    reach = np.abs(_gap(linkage, q))
-    step = 2.0 * float(np.diff(t).max()) * float(speed.max())
-    if reach.max() + step < high and (low == 0.0 or reach.min() - step > low) and reach.min() > step:
+    speed = np.abs(driven[1]) * np.array([[a1], [a4]])
+    speed = speed[0] + speed[1]
+    spans = np.diff(t)
+    step = 2.0 * float(spans.max()) * float(speed.max())
+    if low + step < reach.min() and reach.max() < high - step:
         return
-    steps = 2.0 * np.diff(t) * np.maximum(speed[1:], speed[:-1])
+    steps = 2.0 * spans * np.maximum(speed[1:], speed[:-1])
     far = np.maximum(reach[1:], reach[:-1]) + steps >= high
     near = np.minimum(reach[1:], reach[:-1]) - steps <= low
-    _follow(linkage, t, (q, v, a), np.flatnonzero(far | near))
+    _follow(linkage, t, driven, np.flatnonzero(far | near))
 
 
 def _bounds(linkage: FiveBar) -> tuple[float, float]:

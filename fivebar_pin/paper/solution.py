@@ -119,9 +119,8 @@ def solve(
         SingularityError: O2, O3, O4 on a line at a sample, or between two of them.
         InvalidInputError: the motion does not have two columns.
     """
-    q, v, a = _driven(motion.q, motion.v, motion.a)
-    check_path(linkage, motion.t, q, v, a)
-    return _solve(linkage, motion.t, (q, v, a), AssemblyMode.parse(mode), gravity, motion.t)
+    driven = _driven(motion.q, motion.v, motion.a)
+    return _solve(linkage, motion.t, driven, AssemblyMode.parse(mode), gravity, motion.t)
 
 
 def solve_states(
@@ -162,6 +161,7 @@ def _solve(
         partials=np.empty((2, 2, n)),
         torque=np.empty((2, n)),
         forces=np.empty((5, n), dtype=np.complex128),
+        reach2=np.empty(n),
         force=np.zeros((3, n)),
         moment=np.zeros((3, n)),
         com=np.zeros((3, n)),
@@ -170,10 +170,11 @@ def _solve(
     for k in range(0, n, _BLOCK):
         s = slice(k, min(k + _BLOCK, n))
         q, v, a = (x[:, s] for x in driven)
-        b, X = links(linkage, q[0], q[1], mode=mode, times=None if times is None else times[s], first=k)
+        b, X, out.reach2[s] = links(linkage, q[0], q[1], mode=mode, times=None if times is None else times[s], first=k)
         _move(b, X, (q, v, a), out, s)
         _load(load, b, X, out, s)
     if times is not None:
+        check_path(linkage, times, driven, np.sqrt(out.reach2))
         out.angles[1:3] = unwrapped(out.angles[1:3])
     f = out.forces.view(np.float64).reshape(5, n, 2).transpose(1, 0, 2)
     arrays = [x.T for x in (out.angles, out.rates, out.accelerations)]
@@ -193,6 +194,7 @@ class _Rows:
     partials: Array
     torque: Array
     forces: CArray
+    reach2: Array
     force: Array
     moment: Array
     com: Array
@@ -226,13 +228,12 @@ def _move(b: CArray, X: Array, driven: tuple[Array, Array, Array], out: _Rows, s
     """Fill angles, rates, accelerations and partial derivatives of one block."""
     q, v, a = driven
     angles, rates, accelerations = out.angles[:, s], out.rates[:, s], out.accelerations[:, s]
-    P = partials(b, X)
+    P = partials(b, X, out=out.partials[..., s])
     angles[::3], rates[::3], accelerations[::3] = q, v, a
     np.arctan2(b[1:3].imag, b[1:3].real, out=angles[1:3])
     np.multiply(P[:, 0], v[0], out=rates[1:3])
     rates[1:3] += P[:, 1] * v[1]
     accelerations[1:3] = passive_acceleration(b, X, P, rates, a)
-    out.partials[..., s] = P
 
 
 def _load(k: _Coefficients, b: CArray, X: Array, out: _Rows, s: slice) -> None:
