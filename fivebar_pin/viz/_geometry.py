@@ -1,0 +1,193 @@
+"""Geometry of a moving mechanism, as a viewer needs it: poses, points of each body, plane of motion.
+
+Everything here is in metres, in the axes of the world, and independent of how it is drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array, checked
+from fivebar_pin.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from fivebar_pin.chain import ClosedChain
+    from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]
+
+_PARALLEL = 1e-6
+"""Sine of the largest angle [-] between two axes that count as parallel."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Where every body is at every sample.
+
+    Attributes:
+        t: times (n,) [s].
+        joints: pose of each joint frame, the universe first (n, njoints, 4, 4).
+        com: total centre of mass (n, 3) [m]; empty (0, 3) when nothing has mass.
+    """
+
+    t: Array
+    joints: Array
+    com: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointShape:
+    """What a joint looks like: "hinge" or "slide" along a unit axis of its own frame, "ball" (axis unused), "free"."""
+
+    kind: str
+    axis: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """Axes of the picture.
+
+    Attributes:
+        right: unit vector that points right on the screen (3,).
+        up: unit vector that points up (3,).
+        planar: whether all motion is in the plane of right and up.
+    """
+
+    right: Array
+    up: Array
+    planar: bool
+
+    @property
+    def normal(self) -> Array:
+        """Unit vector towards the viewer (3,)."""
+        return np.asarray(np.cross(self.right, self.up))
+
+
+def compute_poses(chain: ClosedChain, trajectory: Trajectory) -> Poses:
+    """Return the forward kinematics of all samples.
+
+    Raises:
+        InvalidInputError: a trajectory that is not one of this chain, or holds no sample.
+    """
+    t = checked("trajectory.t", trajectory.t, (None,))
+    if t.size == 0:
+        raise InvalidInputError("trajectory", "no samples", "must hold at least one sample to be shown")
+    q = checked("trajectory.q", trajectory.q, (t.size, chain.nq))
+    model, data = chain.model, chain.model.createData()
+    joints = np.empty((t.size, model.njoints, 4, 4))
+    heavy = chain.mass > 0.0
+    com = np.empty((t.size if heavy else 0, 3))
+    for k, row in enumerate(q):
+        pin.forwardKinematics(model, data, np.array(row))
+        for j, placement in enumerate(data.oMi):
+            joints[k, j] = placement.homogeneous
+        if heavy:
+            com[k] = pin.centerOfMass(model, data, False)
+    return Poses(t, joints, com)
+
+
+def joint_shapes(chain: ClosedChain, q: Array) -> tuple[JointShape, ...]:
+    """Return the shape of every joint (the universe left out) from its motion subspace."""
+    model, data = chain.model, chain.model.createData()
+    pin.computeJointJacobians(model, data, np.array(q))
+    shapes = []
+    for j in range(1, model.njoints):
+        first, width = model.idx_vs[j], model.nvs[j]
+        S = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL)[:, first : first + width]
+        shapes.append(_shape_of(S))
+    return tuple(shapes)
+
+
+def _shape_of(S: Array) -> JointShape:
+    """Return the shape of a joint with motion subspace S (6, nv of the joint), linear before angular."""
+    turns, slides = np.linalg.norm(S[3:], axis=0), np.linalg.norm(S[:3], axis=0)
+    if S.shape[1] == 1:
+        column = S[3:, 0] if turns[0] > 0.0 else S[:3, 0]
+        return JointShape("hinge" if turns[0] > 0.0 else "slide", column / np.linalg.norm(column))
+    if np.any(slides > 0.0):
+        return JointShape("free", np.array([0.0, 0.0, 1.0]))
+    return JointShape("ball", np.array([0.0, 0.0, 1.0]))
+
+
+def body_points(chain: ClosedChain, joint: int) -> Array:
+    """Return the points (k, 3) [m] that the body of a joint connects, in its own frame, its own joint first.
+
+    These are the joints it carries and its closure frames; for the last body of a branch the farthest frame
+    on it, or its mass centre when there is none.
+    """
+    model = chain.model
+    points = [np.zeros(3)]
+    points += [np.array(model.jointPlacements[k].translation) for k in model.children[joint]]
+    for closure in chain.closures:
+        for name in closure.frames:
+            frame = model.frames[model.getFrameId(name)]
+            if frame.parentJoint == joint:
+                points.append(np.array(frame.placement.translation))
+    if len(points) == 1:
+        ends = [np.array(f.placement.translation) for f in model.frames if f.parentJoint == joint]
+        ends.append(np.array(model.inertias[joint].lever))
+        tip = max(ends, key=lambda p: float(np.linalg.norm(p)))
+        points.append(tip)
+    return _distinct(np.array(points))
+
+
+def _distinct(points: Array) -> Array:
+    """Return the points without repetitions, in their order."""
+    kept: list[Array] = []
+    tolerance = 1e-9 * max(float(np.max(np.abs(points))), 1e-9)
+    for point in points:
+        if all(float(np.linalg.norm(point - other)) > tolerance for other in kept):
+            kept.append(point)
+    return np.array(kept)
+
+
+def find_view(chain: ClosedChain, q: Array) -> View:
+    """Return the axes of the picture: onto the plane of motion when there is one, else the usual upright axes."""
+    gravity = np.asarray(chain.model.gravity.linear, dtype=np.float64)
+    against = [-gravity / np.linalg.norm(gravity)] if np.linalg.norm(gravity) > 0.0 else []
+    normal = _plane_normal(chain, q)
+    x, y, z = np.eye(3)
+    if normal is None:
+        up = against[0] if against else z
+        right = x if abs(up @ x) < 0.9 else y
+        right = right - (right @ up) * up
+        return View(right / np.linalg.norm(right), up, planar=False)
+    # The first of these that lies well within the plane is up: against gravity, then z, then y.
+    up = next(u for u in [*against, z, y] if np.linalg.norm(np.cross(u, normal)) > 0.5)
+    up = up - (up @ normal) * normal
+    up /= np.linalg.norm(up)
+    right = np.cross(up, normal)
+    # Of the two sides of the plane, look from the one that has x (else y) to the right.
+    facing = right[0] if abs(right[0]) > 1e-9 else right[1]
+    return View(right * np.sign(facing or 1.0), up, planar=True)
+
+
+def _plane_normal(chain: ClosedChain, q: Array) -> Array | None:
+    """Return the unit normal of the plane that all motion is parallel to, or None."""
+    model, data = chain.model, chain.model.createData()
+    pin.computeJointJacobians(model, data, np.array(q))
+    turns, slides = [], []
+    for j in range(1, model.njoints):
+        first, width = model.idx_vs[j], model.nvs[j]
+        S = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:, first : first + width]
+        turns += [w / np.linalg.norm(w) for w in S[3:].T if np.linalg.norm(w) > 0.0]
+        slides += [u / np.linalg.norm(u) for u, w in zip(S[:3].T, S[3:].T, strict=True) if np.linalg.norm(w) == 0.0]
+    normal = turns[0] if turns else _slide_normal(slides)
+    if normal is None:
+        return None
+    tilted = any(np.linalg.norm(np.cross(w, normal)) > _PARALLEL for w in turns)
+    leaving = any(abs(u @ normal) > _PARALLEL for u in slides)
+    return None if tilted or leaving else np.asarray(normal)
+
+
+def _slide_normal(slides: list[Array]) -> Array | None:
+    """Return the normal of the plane of sliding directions, None when they do not span one."""
+    for u in slides[1:]:
+        normal = np.cross(slides[0], u)
+        if np.linalg.norm(normal) > _PARALLEL:
+            return np.asarray(normal / np.linalg.norm(normal))
+    return None

@@ -1,0 +1,299 @@
+"""Draw one mechanism into a recorder: bodies, joints, closures, ground, mass centres, trace and force arrow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.closures import ClosureKind
+from fivebar_pin.viz._geometry import JointShape, Poses, View, body_points, joint_shapes
+from fivebar_pin.viz._record import Colour, Recorder, along, pose
+
+if TYPE_CHECKING:
+    from fivebar_pin.chain import ClosedChain
+
+__all__ = ["COLOURS", "LINK_COLOURS", "Drawing", "amid_ground", "body_names", "draw_mechanism", "reach", "safe"]
+
+LINK_COLOURS: tuple[Colour, ...] = (
+    (0.00, 0.45, 0.70, 1.0),
+    (0.90, 0.62, 0.00, 1.0),
+    (0.00, 0.62, 0.45, 1.0),
+    (0.34, 0.71, 0.91, 1.0),
+    (0.84, 0.37, 0.00, 1.0),
+    (0.55, 0.50, 0.75, 1.0),
+)
+"""Colours of bodies without visuals, in turn; told apart with any colour vision."""
+
+COLOURS: dict[str, Colour] = {
+    "joint": (0.20, 0.20, 0.22, 1.0),
+    "closure": (0.98, 0.90, 0.20, 1.0),
+    "ground": (0.55, 0.57, 0.60, 1.0),
+    "body com": (1.0, 1.0, 1.0, 1.0),
+    "com": (0.80, 0.00, 0.55, 1.0),
+    "force": (0.05, 0.05, 0.05, 1.0),
+}
+
+_THICKNESS = 0.045
+"""Radius of a link, as a part of the chain's characteristic length [-]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """One mechanism and what is drawn of it.
+
+    Attributes:
+        chain: the mechanism.
+        poses: where its bodies are.
+        force: shaking force (n, 3) [N], or None.
+        view: axes of the picture.
+        keys: samples that become keyframes (k,).
+        times: playing times of the keyframes (k,) [s].
+        arrow: length of an arrow per force [m/N].
+        size: common size of the scene [m], for what has none of its own.
+        mass_unit: mass whose sphere has the full radius [kg]; 0: all spheres are alike.
+    """
+
+    chain: ClosedChain
+    poses: Poses
+    force: Array | None
+    view: View
+    keys: npt.NDArray[np.intp]
+    times: Array
+    arrow: float
+    size: float
+    mass_unit: float
+
+    @property
+    def radius(self) -> float:
+        """Radius of a link [m]."""
+        return min(_THICKNESS * self.chain.length, 0.04 * self.size)
+
+
+def safe(name: str) -> str:
+    """Return a name as one step of a scene path."""
+    return name.replace("/", "_") or "_"
+
+
+def body_names(chain: ClosedChain) -> tuple[str, ...]:
+    """Return what the body of each joint is called: its body frame where there is exactly one, else its joint."""
+    names = []
+    for j, joint in enumerate(chain.joints, start=1):
+        frames = [f.name for f in chain.model.frames if f.parentJoint == j and f.type.name == "BODY"]
+        names.append(safe(frames[0] if frames else joint))
+    return tuple(n if names.count(n) == 1 else safe(j) for n, j in zip(names, chain.joints, strict=True))
+
+
+def reach(chain: ClosedChain, poses: Poses) -> Array:
+    """Return the points (k, 3) [m] that the mechanism passes through: joints, ends of the bodies, mass centres."""
+    points = [poses.joints[:, j, :3, 3] for j in range(1, chain.model.njoints) if chain.model.parents[j] == 0]
+    for j in range(1, chain.model.njoints):
+        local = [*body_points(chain, j), np.array(chain.model.inertias[j].lever)]
+        R, p = poses.joints[:, j, :3, :3], poses.joints[:, j, :3, 3]
+        points += [R @ x + p for x in local]
+    return np.concatenate([*points, poses.com] if points else [np.zeros((1, 3)), poses.com])
+
+
+def draw_mechanism(recorder: Recorder, path: str, drawing: Drawing) -> None:
+    """Draw all of one mechanism under a path of the scene, in metres and world axes."""
+    shapes = joint_shapes(drawing.chain, _neutral(drawing.chain))
+    drawn = {v.frame for v in drawing.chain.visuals}
+    frames = drawing.chain.model.frames
+    dressed = {f.parentJoint for f in frames if f.name in drawn}
+    for j, body in enumerate(body_names(drawing.chain), start=1):
+        node = f"{path}/{body}"
+        if j not in dressed:
+            _draw_link(recorder, f"{node}/link", drawing, j)
+        _draw_joint(recorder, f"{node}/joint", drawing, shapes[j - 1])
+        _draw_body_com(recorder, f"{node}/com", drawing, j)
+        _move(recorder, node, drawing, drawing.poses.joints[:, j])
+    _draw_visuals(recorder, path, drawing)
+    _draw_closures(recorder, path, drawing)
+    _draw_ground(recorder, f"{path}/ground", drawing, shapes)
+    _draw_com(recorder, path, drawing)
+    if drawing.force is not None and drawing.arrow > 0.0:
+        _draw_force(recorder, f"{path}/force", drawing, drawing.force[drawing.keys])
+
+
+def _neutral(chain: ClosedChain) -> Array:
+    import pinocchio as pin
+
+    return np.asarray(pin.neutral(chain.model))
+
+
+def _node(chain: ClosedChain, path: str, joint: int) -> str:
+    """Return the scene node of the body of a joint (0: the ground)."""
+    return f"{path}/{body_names(chain)[joint - 1]}" if joint else f"{path}/ground"
+
+
+def _draw_link(recorder: Recorder, path: str, drawing: Drawing, joint: int) -> None:
+    """Draw rods between the points of a body: all sides of a triangle, else a star from its own joint."""
+    points, r = body_points(drawing.chain, joint), drawing.radius
+    colour = LINK_COLOURS[(joint - 1) % len(LINK_COLOURS)]
+    pairs = [(0, k) for k in range(1, len(points))] + ([(1, 2)] if len(points) == 3 else [])
+    for number, (a, b) in enumerate(pairs):
+        start, end = points[a], points[b]
+        length = float(np.linalg.norm(end - start))
+        recorder.capsule(f"{path}/{number}", r, length, colour, pose(0.5 * (start + end), end - start))
+    if not pairs:
+        recorder.box(f"{path}/0", (3.0 * r, 3.0 * r, 3.0 * r), colour, np.eye(4))
+
+
+def _draw_joint(recorder: Recorder, path: str, drawing: Drawing, shape: JointShape) -> None:
+    r, colour = drawing.radius, COLOURS["joint"]
+    if shape.kind == "hinge":
+        recorder.cylinder(path, 1.25 * r, 2.8 * r, colour, pose(np.zeros(3), shape.axis))
+    elif shape.kind == "slide":
+        recorder.box(path, (2.6 * r, 2.6 * r, 4.0 * r), colour, pose(np.zeros(3), shape.axis))
+    elif shape.kind == "ball":
+        recorder.sphere(path, 1.4 * r, colour, np.eye(4))
+
+
+def _draw_body_com(recorder: Recorder, path: str, drawing: Drawing, joint: int) -> None:
+    """Draw the mass centre of a body: a white dot with a dark rim, seen through everything, on a thin arm."""
+    inertia = drawing.chain.model.inertias[joint]
+    if inertia.mass <= 0.0:
+        return
+    share = (inertia.mass / drawing.mass_unit) ** (1.0 / 3.0) if drawing.mass_unit > 0.0 else 1.0
+    r = 0.9 * drawing.radius * float(np.clip(share, 0.35, 1.0))
+    centre = np.array(inertia.lever)
+    recorder.line(f"{path}/arm", np.array([np.zeros(3), centre]), COLOURS["joint"], on_top=True)
+    recorder.sphere(f"{path}/rim", r, COLOURS["joint"], pose(centre), on_top=True)
+    recorder.sphere(f"{path}/dot", 0.72 * r, COLOURS["body com"], pose(centre), on_top=True)
+    recorder.set(f"{path}/dot", "renderOrder", 2)
+
+
+def _draw_visuals(recorder: Recorder, path: str, drawing: Drawing) -> None:
+    model = drawing.chain.model
+    for number, visual in enumerate(drawing.chain.visuals):
+        frame = model.frames[model.getFrameId(visual.frame)]
+        node = f"{_node(drawing.chain, path, frame.parentJoint)}/visual {number}"
+        recorder.place(node, frame.placement.homogeneous)
+        recorder.visual(f"{node}/shape", visual)
+
+
+def _draw_closures(recorder: Recorder, path: str, drawing: Drawing) -> None:
+    """Draw both frames of each closure: a yellow pin on the first, a smaller dark one on the second."""
+    model, r = drawing.chain.model, drawing.radius
+    for closure in drawing.chain.closures:
+        for number, name in enumerate(closure.frames):
+            frame = model.frames[model.getFrameId(name)]
+            node = f"{_node(drawing.chain, path, frame.parentJoint)}/closure {safe(closure.name)} {number + 1}"
+            recorder.place(node, frame.placement.homogeneous)
+            colour = COLOURS["closure"] if number == 0 else COLOURS["joint"]
+            wide, long = (1.5 * r, 3.2 * r) if number == 0 else (0.7 * r, 3.6 * r)
+            axis = np.asarray(closure.axis, dtype=np.float64)
+            if closure.kind is ClosureKind.POINT and drawing.view.planar:
+                rotation = drawing.poses.joints[0, frame.parentJoint, :3, :3] @ frame.placement.rotation
+                axis = rotation.T @ drawing.view.normal
+            if closure.kind is ClosureKind.WELD:
+                recorder.box(f"{node}/mark", (2 * wide, 2 * wide, 2 * wide), colour, np.eye(4))
+            elif closure.kind is ClosureKind.POINT and not drawing.view.planar:
+                recorder.sphere(f"{node}/mark", wide, colour, np.eye(4))
+            else:
+                recorder.cylinder(f"{node}/mark", wide, long, colour, pose(np.zeros(3), axis))
+
+
+def _draw_ground(recorder: Recorder, path: str, drawing: Drawing, shapes: tuple[JointShape, ...]) -> None:
+    """Draw a foot below every hinge on the ground, and a rail along every slide on it."""
+    model, r, up = drawing.chain.model, drawing.radius, drawing.view.up
+    feet: list[tuple[Array, int | None]] = [(p, None) for p in _ground_closures(drawing.chain)]
+    for j in range(1, model.njoints):
+        if model.parents[j] == 0 and shapes[j - 1].kind != "free":
+            feet.append((np.array(model.jointPlacements[j].translation), j))
+    for number, (p, joint) in enumerate(feet):
+        if joint is not None and shapes[joint - 1].kind == "slide":
+            axis = model.jointPlacements[joint].rotation @ shapes[joint - 1].axis
+            travel = (drawing.poses.joints[:, joint, :3, 3] - p) @ axis
+            low, high = float(travel.min()) - 4.0 * r, float(travel.max()) + 4.0 * r
+            rail = pose(p + 0.5 * (low + high) * axis, axis)
+            recorder.box(f"{path}/rail {number}", (r, r, high - low), COLOURS["ground"], rail)
+            continue
+        foot = pose(p - 2.2 * r * up, up)
+        recorder.cylinder(f"{path}/foot {number}", 2.4 * r, 4.4 * r, COLOURS["ground"], foot, tip=0.2)
+        recorder.box(
+            f"{path}/base {number}", (7.0 * r, 7.0 * r, 0.8 * r), COLOURS["ground"], pose(p - 4.6 * r * up, up)
+        )
+
+
+def _ground_closures(chain: ClosedChain) -> list[Array]:
+    """Return the places of the closure frames that are fixed to the ground."""
+    frames = [chain.model.frames[chain.model.getFrameId(f)] for c in chain.closures for f in c.frames]
+    return [np.array(f.placement.translation) for f in frames if f.parentJoint == 0]
+
+
+def _draw_com(recorder: Recorder, path: str, drawing: Drawing) -> None:
+    """Draw the total centre of mass and the line through its places at all samples."""
+    com, r = drawing.poses.com, drawing.radius
+    if not len(com):
+        return
+    recorder.line(f"{path}/trace/line", com, COLOURS["com"], on_top=True)
+    if float(np.max(np.ptp(com, axis=0))) > 0.05 * r:
+        vertices, faces = _ribbon(com, drawing.view.normal, 0.16 * r)
+        recorder.triangles(f"{path}/trace/ribbon", vertices, faces, COLOURS["com"], on_top=True)
+    recorder.sphere(f"{path}/com/ball", 0.9 * r, COLOURS["com"], np.eye(4), on_top=True)
+    recorder.set(f"{path}/com/ball", "renderOrder", 3)
+    recorder.place(f"{path}/com", pose(com[0]))
+    recorder.animate(f"{path}/com", drawing.times, position=com[drawing.keys])
+
+
+def _ribbon(points: Array, normal: Array, half: float) -> tuple[Array, Array]:
+    """Return vertices and faces of a band of given half width about a line, facing a direction."""
+    step = np.gradient(points, axis=0) if len(points) > 1 else np.zeros_like(points)
+    side = np.cross(normal, step)
+    length = np.linalg.norm(side, axis=1, keepdims=True)
+    side = np.divide(side, length, out=np.zeros_like(side), where=length > 1e-12)
+    vertices = np.concatenate([points + half * side, points - half * side])
+    n = len(points)
+    k = np.arange(n - 1)
+    faces = np.concatenate([np.stack([k, k + 1, n + k], axis=1), np.stack([k + 1, n + k + 1, n + k], axis=1)])
+    return vertices, faces
+
+
+def _draw_force(recorder: Recorder, path: str, drawing: Drawing, force: Array) -> None:
+    """Draw the shaking force (k, 3) as an arrow whose tail is amid the joints on the ground."""
+    r, colour = drawing.radius, COLOURS["force"]
+    head = 3.4 * r
+    recorder.place(path, pose(amid_ground(drawing.chain)))
+    rod, cone = pose(np.array([0.0, 0.0, 0.5])), pose(np.array([0.0, 0.0, -0.5 * head]))
+    recorder.cylinder(f"{path}/shaft/rod", 0.55 * r, 1.0, colour, rod, on_top=True)
+    recorder.cylinder(f"{path}/head/cone", 1.5 * r, head, colour, cone, tip=0.02, on_top=True)
+    for part in ("shaft/rod", "head/cone"):
+        recorder.set(f"{path}/{part}", "renderOrder", 4)
+    length = drawing.arrow * np.linalg.norm(force, axis=1)
+    # A short arrow is drawn smaller as a whole; an arrow of no length keeps a scale above zero.
+    size = np.clip(length / (1.5 * head), 1e-6, 1.0)
+    shaft = np.maximum(length - head * size, 1e-6 * head)
+    directions = np.where(size[:, None] > 1e-6, force, drawing.view.up)
+    zero = np.zeros_like(length)
+    recorder.animate(path, drawing.times, quaternion=_quaternions(np.array([along(f) for f in directions])))
+    recorder.animate(f"{path}/shaft", drawing.times, scale=np.stack([size, size, shaft], axis=1))
+    tips = np.stack([zero, zero, length], axis=1)
+    recorder.animate(f"{path}/head", drawing.times, position=tips, scale=np.stack([size, size, size], axis=1))
+
+
+def amid_ground(chain: ClosedChain) -> Array:
+    """Return the mean place of the joints on the ground."""
+    model = chain.model
+    places = [np.array(model.jointPlacements[j].translation) for j in range(1, model.njoints) if model.parents[j] == 0]
+    return np.asarray(np.mean([*places, *_ground_closures(chain)], axis=0))
+
+
+def _move(recorder: Recorder, path: str, drawing: Drawing, placements: Array) -> None:
+    """Move a node along placements (n, 4, 4)."""
+    recorder.place(path, placements[0])
+    shown = placements[drawing.keys]
+    recorder.animate(path, drawing.times, position=shown[:, :3, 3], quaternion=_quaternions(shown[:, :3, :3]))
+
+
+def _quaternions(rotations: Array) -> Array:
+    """Return x, y, z, w (k, 4) of rotations (k, 3, 3), without jumps of sign."""
+    from scipy.spatial.transform import Rotation
+
+    Q = np.asarray(Rotation.from_matrix(rotations).as_quat())
+    flips = np.cumprod(np.where(np.sum(Q[1:] * Q[:-1], axis=1) < 0.0, -1.0, 1.0))
+    Q[1:] *= flips[:, None]
+    return Q

@@ -1,0 +1,119 @@
+"""The page around a scene: what it says, and its text."""
+
+from __future__ import annotations
+
+import html
+import json
+import string
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.viz._mechanism import COLOURS, LINK_COLOURS, Drawing, body_names
+from fivebar_pin.viz._record import Colour, Recorder
+from fivebar_pin.viz._stage import Stage
+
+__all__ = ["describe", "render"]
+
+_MOST_LINKS = 10
+"""Links that the legend names; more are counted only."""
+
+
+def describe(
+    recorder: Recorder, names: Sequence[str], drawings: Sequence[Drawing], stage: Stage, *, speed: float
+) -> dict[str, Any]:
+    """Return all that the page needs to know, as plain data."""
+    start = min(float(d.poses.t[0]) for d in drawings)
+    duration = max(float(d.poses.t[-1]) for d in drawings) - start
+    half = [float(x) for x in stage.seen(stage.high)]
+    return {
+        "commands": recorder.packed(duration=duration / speed),
+        "camera": {"direction": [0.0, 0.0, 1.0] if stage.view.planar else [0.55, 0.42, 1.0], "half": half},
+        "start": start,
+        "duration": duration,
+        "speed": speed,
+        "labels": [_label(*x, stage) for x in zip(names, drawings, stage.boxes, strict=True)],
+        "legend": _legend(drawings),
+        "notes": _notes(drawings, stage),
+    }
+
+
+def render(title: str, scene: Mapping[str, Any], *, live: bool = False) -> str:
+    """Return the whole page, the viewer's own program included."""
+    viewer = resources.files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
+    template = resources.files("fivebar_pin.viz").joinpath("page.html").read_text(encoding="utf-8")
+    return string.Template(template).substitute(
+        title=html.escape(title),
+        viewer=viewer.replace("</script", "<\\/script"),
+        scene=json.dumps(scene, allow_nan=False).replace("<", "\\u003c"),
+        connect="'self'" if live else "'none'",
+        live="true" if live else "false",
+    )
+
+
+def _label(name: str, drawing: Drawing, box: Array, stage: Stage) -> dict[str, Any]:
+    """Return the words below a mechanism, where they stand, and the force that runs with the time."""
+    below = np.array([0.5 * (box[0, 0] + box[1, 0]), stage.low[1], 0.5 * (box[0, 2] + box[1, 2])])
+    label: dict[str, Any] = {"text": name, "at": [float(x) for x in stage.seen(below)], "times": [], "force": []}
+    if drawing.force is not None:
+        label["times"] = [float(t) for t in drawing.times]
+        label["force"] = [float(f"{x:.4g}") for x in np.linalg.norm(drawing.force[drawing.keys], axis=1)]
+        label["peak"] = float(np.max(np.linalg.norm(drawing.force, axis=1)))
+    return label
+
+
+def _legend(drawings: Sequence[Drawing]) -> list[dict[str, str]]:
+    """Return the entries of the legend: kind of sign, colour, words."""
+    links = sorted(dict.fromkeys(entry for d in drawings for entry in _link_entries(d)))
+    entries = [_entry("block", colour, name) for name, colour in links[:_MOST_LINKS]]
+    if len(links) > _MOST_LINKS:
+        entries.append(_entry("", COLOURS["joint"], f"and {len(links) - _MOST_LINKS} more links"))
+    if any(d.chain.closures for d in drawings):
+        entries.append(_entry("ring", COLOURS["closure"], "loop closure"))
+    entries.append(_entry("block", COLOURS["ground"], "ground"))
+    entries.append(_entry("rim", COLOURS["body com"], "mass centre of a link"))
+    if any(len(d.poses.com) for d in drawings):
+        entries.append(_entry("trace", COLOURS["com"], "total mass centre and its path"))
+    if any(d.force is not None for d in drawings):
+        entries.append(_entry("arrow", COLOURS["force"], "shaking force on the frame"))
+    return entries
+
+
+def _link_entries(drawing: Drawing) -> list[tuple[str, Colour]]:
+    """Return name and colour of every link as drawn: of its visuals in their order, dark pins left out."""
+    model = drawing.chain.model
+    entries = []
+    for j, name in enumerate(body_names(drawing.chain), start=1):
+        visuals = [v for v in drawing.chain.visuals if model.frames[model.getFrameId(v.frame)].parentJoint == j]
+        if not visuals:
+            entries.append((name, LINK_COLOURS[(j - 1) % len(LINK_COLOURS)]))
+        coloured = dict.fromkeys((v.frame, v.rgba) for v in visuals if max(v.rgba[:3]) > 0.3)
+        entries += list(coloured or dict.fromkeys((v.frame, v.rgba) for v in visuals))
+    return entries
+
+
+def _entry(sign: str, colour: Colour, text: str) -> dict[str, str]:
+    r, g, b = (round(255 * min(max(c, 0.0), 1.0)) for c in colour[:3])
+    return {"sign": sign, "colour": f"rgb({r}, {g}, {b})", "text": text}
+
+
+def _notes(drawings: Sequence[Drawing], stage: Stage) -> list[str]:
+    """Return the scales of the picture in words."""
+    notes = [f"grid {_length(stage.cell)}"]
+    forces = [float(np.max(np.linalg.norm(d.force, axis=1))) for d in drawings if d.force is not None]
+    if forces and drawings[0].arrow > 0.0:
+        notes.append(f"arrow of one grid cell = {stage.cell / drawings[0].arrow:.3g} N, longest {max(forces):.3g} N")
+    elif forces:
+        notes.append("no arrow: the shaking force is zero to round-off")
+    return notes
+
+
+def _length(metres: float) -> str:
+    """Return a length with the unit that suits it."""
+    for unit, factor in (("m", 1.0), ("cm", 1e2), ("mm", 1e3)):
+        if metres * factor >= 0.999:
+            return f"{metres * factor:g} {unit}"
+    return f"{metres:.3g} m"
