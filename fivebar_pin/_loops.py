@@ -144,8 +144,8 @@ class Loops:
         if not self.passive.size:
             return PassiveMap(np.zeros((n, 0, self.r)), np.ones(n), np.ones(n))
         if self.is_square:
-            sign = np.sign(np.linalg.det(Jp))
-            X = _inverse(Jp)
+            X, determinant = inverse(Jp)
+            sign = np.sign(determinant)
             with np.errstate(invalid="ignore", over="ignore"):
                 sigma = 1.0 / np.sqrt(np.einsum("nij,nij->n", X, X))
             sigma = np.where(np.isfinite(sigma), sigma, 0.0)
@@ -225,8 +225,26 @@ def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
     )
 
 
+def inverse(M: Array) -> tuple[Array, Array]:
+    """Invert a batch of square matrices; singular ones become nan. Also return the determinants."""
+    if M.shape[-1] == 2:
+        return _inverse_of_two(M)
+    return _inverse(M), np.asarray(np.linalg.det(M))
+
+
+def _inverse_of_two(M: Array) -> tuple[Array, Array]:
+    """The usual case of one planar loop in closed form: by the cofactors, far cheaper than a factorisation."""
+    det = M[:, 0, 0] * M[:, 1, 1] - M[:, 0, 1] * M[:, 1, 0]
+    with np.errstate(divide="ignore"):
+        scale = np.where(det == 0.0, np.nan, 1.0 / det)
+    X = np.empty_like(M)
+    X[:, 0, 0], X[:, 1, 1] = M[:, 1, 1] * scale, M[:, 0, 0] * scale
+    X[:, 0, 1], X[:, 1, 0] = -M[:, 0, 1] * scale, -M[:, 1, 0] * scale
+    return X, det
+
+
 def _inverse(M: Array) -> Array:
-    """Invert a batch of square matrices; singular ones become nan."""
+    """Invert a batch of square matrices by factorisation; singular ones become nan."""
     try:
         return np.asarray(np.linalg.inv(M))
     except np.linalg.LinAlgError:

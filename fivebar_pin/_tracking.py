@@ -15,30 +15,53 @@ LONGEST = 0.4  # longest predictor step of any coordinate [rad, or chain lengths
 SINGULAR = 1e-7  # scaled smallest singular value below which the passive motion counts as undetermined [-]
 _SHORTEST = 1e-7  # fraction of a step below which the search for a way on is given up
 _TRUST = 0.3  # largest correction, as a fraction of the step that was predicted
+_CORRECTIONS = 6  # Newton steps before a step counts as too long
+_GUIDED = 1e-6  # scaled residual good enough for a node on the way [-]
 
 
 @dataclass(slots=True)
 class _Node:
-    """A closed configuration on the branch, and how the passive coordinates move on from it."""
+    """A nearly closed configuration on the branch, and how the passive coordinates move on from it."""
 
     x: Array  # actuated coordinates (na,)
     q: Array  # (nq,)
     N: Array  # (np, na)
+    bend: Array  # change of N per unit of the last step (np, na)
     sign: float
     sigma: float
 
 
+@dataclass(slots=True)
+class _Corrector:
+    """The closure rows and the passive map at one configuration."""
+
+    residual: Array  # reduced, scaled (r,)
+    X: Array
+    N: Array
+    sign: float
+    sigma: float
+
+
+def _correct(loops: Loops, q: Array) -> _Corrector:
+    poses = loops.tree.poses(q)
+    pairs = loops.pairs(poses)
+    J = loops.jacobian(poses, pairs)
+    passive = loops.passive_map(J)
+    N = -passive.X[0] @ (loops.reduce @ J[0][:, loops.actuated])
+    residual = loops.reduce @ loops.residual(pairs)[0] if loops.m else np.zeros(0)
+    return _Corrector(residual, passive.X[0], N, float(passive.sign[0]), float(passive.sigma[0]))
+
+
 def node_at(loops: Loops, q: Array, x: Array) -> _Node:
     """Prepare a closed configuration q (nq,) with actuated coordinates x (na,)."""
-    poses = loops.tree.poses(q[None])
-    J = loops.jacobian(poses, loops.pairs(poses))
-    passive = loops.passive_map(J)
-    N = -np.matmul(passive.X, np.matmul(loops.reduce, J[:, :, loops.actuated]))[0]
-    return _Node(np.array(x), np.array(q), N, float(passive.sign[0]), float(passive.sigma[0]))
+    here = _correct(loops, q[None])
+    return _Node(np.array(x), np.array(q), here.N, np.zeros_like(here.N), here.sign, here.sigma)
 
 
-def follow(loops: Loops, node: _Node, target: Array, tolerance: float) -> _Node:
+def follow(loops: Loops, node: _Node, target: Array) -> _Node:
     """Go from one node to the actuated coordinates `target` (na,) along the straight line, on the same branch.
+
+    The node reached is a guide, closed to about 1e-6: polish it.
 
     Raises:
         SingularityError, AssemblyError: the way is blocked; without sample and time.
@@ -48,7 +71,7 @@ def follow(loops: Loops, node: _Node, target: Array, tolerance: float) -> _Node:
     while done < 1.0:
         step = min(step, 1.0 - done)
         x = start + (done + step) * (target - start)
-        reached = _try(loops, node, x, tolerance)
+        reached = _try(loops, node, x)
         if reached is None:
             step *= 0.5
             if step < _SHORTEST:
@@ -83,13 +106,13 @@ def track(loops: Loops, q0: Array, X: Array, tolerance: float) -> Closed:
     while index[-1] < n - 1:
         i = index[-1]
         k = min(n - 1, max(i + 1, int(np.searchsorted(path, path[i] + reach, side="right")) - 1))
-        reached = _try(loops, nodes[-1], X[k], tolerance)
+        reached = _try(loops, nodes[-1], X[k])
         if reached is None and k > i + 1:
             reach *= 0.5
             continue
         if reached is None:
             try:
-                reached = follow(loops, nodes[-1], X[k], tolerance)
+                reached = follow(loops, nodes[-1], X[k])
             except (AssemblyError, SingularityError) as error:
                 raise _located(error, k) from None
         else:
@@ -99,23 +122,37 @@ def track(loops: Loops, q0: Array, X: Array, tolerance: float) -> Closed:
     return _fill(loops, np.array(index), nodes, X, tolerance)
 
 
-def _try(loops: Loops, node: _Node, x: Array, tolerance: float) -> _Node | None:
-    """Take one predictor-corrector step; None when it is not clearly on the same branch."""
+def _try(loops: Loops, node: _Node, x: Array) -> _Node | None:
+    """Take one predictor-corrector step; None when it is not clearly on the same branch.
+
+    The corrector stops at a residual that one more Newton step would take to round-off: nodes only guide the way.
+    """
     dx = x - node.x
+    length = float(np.abs(dx).max(initial=0.0))
     tangent = np.zeros(loops.tree.nv)
-    tangent[loops.actuated], tangent[loops.passive] = dx, node.N @ dx
-    size = float(np.abs(tangent / loops.column_scale).max(initial=0.0))
+    tangent[loops.actuated], tangent[loops.passive] = dx, (node.N + 0.5 * length * node.bend) @ dx
+    scale = loops.column_scale
+    size = float(np.abs(tangent / scale).max(initial=0.0))
     if not size <= LONGEST:
         return None
-    guess = loops.tree.integrate(node.q[None], tangent[None])
-    _set_actuated(loops, guess, x[None])
-    closed = polish(loops, guess)
-    if not closed_enough(loops, closed.residual, tolerance)[0] or closed.correction[0] > _TRUST * size + 1e-9:
-        return None
-    reached = node_at(loops, closed.q[0], x)
-    if reached.sign != node.sign or reached.sigma < SINGULAR:
-        return None
-    return reached
+    q = loops.tree.integrate(node.q[None], tangent[None])
+    _set_actuated(loops, q, x[None])
+    correction = 0.0
+    for _ in range(_CORRECTIONS):
+        here = _correct(loops, q)
+        if here.sign != node.sign or not here.sigma >= SINGULAR:
+            return None
+        error = float(np.abs(here.residual).max(initial=0.0))
+        if error < _GUIDED:
+            bend = (here.N - node.N) / length if length > 0.0 else node.bend
+            return _Node(np.array(x), q[0], here.N, bend, here.sign, here.sigma)
+        step = np.zeros(loops.tree.nv)
+        step[loops.passive] = -here.X @ here.residual
+        correction += float(np.abs(step / scale).max())
+        if not correction <= _TRUST * size + 1e-9:
+            return None
+        q = loops.tree.integrate(q, step[None])
+    return None
 
 
 def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, tolerance: float) -> Closed:
@@ -141,7 +178,7 @@ def _mend(
         node = nodes[b]
         for k in range(index[b], index[b + 1] + 1 if b + 1 < index.size else index[b] + 1):
             try:
-                node = follow(loops, node, X[k], tolerance)
+                node = follow(loops, node, X[k])
             except (AssemblyError, SingularityError) as error:
                 raise _located(error, k) from None
             again = polish(loops, node.q[None])

@@ -40,6 +40,7 @@ class _Joint:
     axis: Array  # unit, in the joint frame
     K: Array  # [axis]x
     K2: Array  # [axis]x squared
+    aligned: int  # 0, 1, 2 when the axis is x, y, z of the joint frame, else -1
     q: slice
     v: slice
     model: Any  # Pinocchio's joint model
@@ -225,6 +226,7 @@ def _read_joint(model: pin.Model, j: int) -> _Joint:
         axis=axis,
         K=K,
         K2=K @ K,
+        aligned=int(np.argmax(axis)) if np.array_equal(np.sort(axis), [0.0, 0.0, 1.0]) else -1,
         q=slice(joint.idx_q, joint.idx_q + joint.nq),
         v=slice(joint.idx_v, joint.idx_v + joint.nv),
         model=joint,
@@ -250,12 +252,26 @@ def _advance(joint: _Joint, q: Array, R: list[Array], p: list[Array], S: Array) 
             c, s = np.cos(angle), np.sin(angle)
         else:
             c, s = q[:, joint.q.start], q[:, joint.q.start + 1]
-        turn = np.eye(3) + s[:, None, None] * joint.K + (1.0 - c)[:, None, None] * joint.K2
-        R.append(turn if joint.parent == 0 and joint.R is None else np.matmul(Rj, turn))
+        Rw, axis = _turned(joint, Rj, c, s)
+        R.append(Rw)
         p.append(pj)
-        axis = np.matmul(Rj, joint.axis)
         S[:, 3:, k] = axis
         S[:, :3, k] = cross(pj, axis)
+
+
+def _turned(joint: _Joint, R: Array, c: Array, s: Array) -> tuple[Array, Array]:
+    """Return R turned about the joint axis (n, 3, 3) and the axis in the world (n, 3)."""
+    if joint.aligned < 0:
+        turn = np.eye(3) + s[:, None, None] * joint.K + (1.0 - c)[:, None, None] * joint.K2
+        return np.matmul(R, turn), np.matmul(R, joint.axis)
+    i = joint.aligned
+    j, k = (i + 1) % 3, (i + 2) % 3
+    out = np.empty((c.size, 3, 3))
+    c, s = c[:, None], s[:, None]
+    out[:, :, i] = R[:, :, i]
+    out[:, :, j] = c * R[:, :, j] + s * R[:, :, k]
+    out[:, :, k] = c * R[:, :, k] - s * R[:, :, j]
+    return out, out[:, :, i]
 
 
 def _advance_other(joint: _Joint, q: Array, Rj: Array, pj: Array, R: list[Array], p: list[Array], S: Array) -> None:

@@ -227,7 +227,7 @@ def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Arr
         at = np.array([loops.tree.coordinate(q, int(k))[0] for k in loops.actuated])
         node = node_at(loops, q[0], at)
         if node.sigma >= SINGULAR:
-            q = polish(loops, follow(loops, node, x, tolerance).q[None]).q
+            q = polish(loops, follow(loops, node, x).q[None]).q
             _write_actuated(loops, q, x)
             return np.asarray(q[0])
     _write_actuated(loops, q, x)
