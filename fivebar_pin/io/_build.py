@@ -1,0 +1,241 @@
+"""From a checked tree to a pin.Model, in Pinocchio's own joint order or the one the sidecar asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.io._sidecar import DATA_FIELDS, Sidecar
+from fivebar_pin.io._tree import UNLIMITED, JointEntry, TreeEntry
+
+__all__ = ["build_model", "joint_model", "joint_order", "set_default_limits"]
+
+ROOT_JOINT = "root_joint"
+_AXES = {(1.0, 0.0, 0.0): 0, (0.0, 1.0, 0.0): 1, (0.0, 0.0, 1.0): 2}
+_ALIGNED = {
+    "revolute": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
+    "continuous": (pin.JointModelRUBX, pin.JointModelRUBY, pin.JointModelRUBZ),
+    "prismatic": (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),
+}
+_UNALIGNED = {
+    "revolute": pin.JointModelRevoluteUnaligned,
+    "continuous": pin.JointModelRevoluteUnboundedUnaligned,
+    "prismatic": pin.JointModelPrismaticUnaligned,
+}
+_OTHERS = {
+    "floating": pin.JointModelFreeFlyer,
+    "planar": pin.JointModelPlanar,
+    "SPHERICAL": pin.JointModelSpherical,
+    "SPHERICAL_ZYX": pin.JointModelSphericalZYX,
+    "TRANSLATION": pin.JointModelTranslation,
+}
+
+
+def joint_order(tree: TreeEntry) -> list[str]:
+    """Return all joints, fixed ones too, depth first and alphabetical, as Pinocchio's reader takes them."""
+    children: dict[str, list[str]] = {}
+    for name in sorted(tree.joints, reverse=True):
+        children.setdefault(tree.joints[name].parent, []).append(name)
+    order: list[str] = []
+    stack = list(children.get(tree.root, []))
+    while stack:
+        order.append(stack.pop())
+        stack.extend(children.get(tree.joints[order[-1]].child, []))
+    return order
+
+
+def build_model(tree: TreeEntry, sidecar: Sidecar, *, free_flyer: bool, urdf: Path, beside: Path) -> pin.Model:
+    """Return the open tree as a pin.Model.
+
+    Args:
+        tree: the URDF.
+        sidecar: joint types, order, gravity, joint data and configurations that the URDF cannot state.
+        free_flyer: put the root link on a free-flying base.
+        urdf: file to name in errors about the tree.
+        beside: file to name in errors about the sidecar.
+    """
+    tree = _with_types(tree, sidecar.joint_types, beside)
+    return _Builder(tree, free_flyer, urdf).model(sidecar, beside)
+
+
+def _with_types(tree: TreeEntry, types: Mapping[str, str], beside: Path) -> TreeEntry:
+    joints = dict(tree.joints)
+    for name, word in types.items():
+        if name not in joints:
+            raise FileFormatError(beside, "joint_name: " + str(UnknownNameError("joint", name, joints)))
+        joint = joints[name]
+        if word == "FIXED":
+            joints[name] = replace(joint, kind="fixed", data={})
+        elif word == "CARDAN":
+            joints.update(_cardan(joints.pop(name), tree, beside))
+        else:
+            joints[name] = replace(joint, kind=word, data={})
+    links = {**tree.links}
+    for joint in joints.values():
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                links[end] = replace(links[tree.root], name=end, inertia=None, visuals=())
+    return replace(tree, joints=joints, links=links)
+
+
+def _cardan(joint: JointEntry, tree: TreeEntry, beside: Path) -> dict[str, JointEntry]:
+    """Return two revolute joints, about x then y of the joint's axes, with a massless cross between them."""
+    x, y, cross = f"{joint.name}_X", f"{joint.name}_Y", f"{joint.name}_cross"
+    if {x, y} & set(tree.joints) or cross in tree.links:
+        raise FileFormatError(beside, f"joint_type: CARDAN on {joint.name!r} would make a second {x}, {y} or {cross}")
+    data = {"lower": [-UNLIMITED], "upper": [UNLIMITED]}
+    return {
+        x: replace(joint, name=x, kind="revolute", child=cross, axis=np.eye(3)[0], data=data),
+        y: replace(joint, name=y, kind="revolute", parent=cross, placement=np.eye(4), axis=np.eye(3)[1], data=data),
+    }
+
+
+class _Builder:
+    """Adds the joints of one tree to one model."""
+
+    def __init__(self, tree: TreeEntry, free_flyer: bool, urdf: Path) -> None:
+        self.tree, self.urdf, self.free_flyer = tree, urdf, free_flyer
+        self.pin = pin.Model()
+        self.pin.name = tree.name
+        self.inertias: dict[int, list[tuple[Array, pin.Inertia]]] = {}
+        self.link: dict[str, tuple[int, Array, int]] = {}
+        base = 0
+        if free_flyer:
+            if ROOT_JOINT in tree.joints:
+                raise FileFormatError(urdf, f"has a joint {ROOT_JOINT!r} already; a free-flying base needs that name")
+            base = self.pin.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT_JOINT)
+            self.pin.addJointFrame(base, 0)
+        self.body(tree.root, base, np.eye(4), self.pin.nframes - 1)
+
+    def model(self, sidecar: Sidecar, beside: Path) -> pin.Model:
+        for name in self.order(sidecar, beside):
+            self.joint(self.tree.joints[name])
+        for j, parts in self.inertias.items():
+            self.pin.inertias[j] = _merged(parts)
+        for name, entries in sidecar.joint_data.items():
+            _set_data(self.pin, name, entries, beside)
+        if sidecar.gravity is not None:
+            self.pin.gravity.linear = np.array(sidecar.gravity)
+        for name, q in sidecar.configurations.items():
+            if len(q) != self.pin.nq:
+                where = f"reference_configurations of {name}"
+                raise FileFormatError(beside, f"{where}: has {len(q)} values; the mechanism has nq = {self.pin.nq}")
+            self.pin.referenceConfigurations[name] = np.array(q)
+        return self.pin
+
+    def order(self, sidecar: Sidecar, beside: Path) -> list[str]:
+        everything = joint_order(self.tree)
+        if sidecar.joint_order is None:
+            return everything
+        moving = [name for name in everything if self.tree.joints[name].kind != "fixed"]
+        for name in sidecar.joint_order:
+            if name not in moving and (name != ROOT_JOINT or not self.free_flyer):
+                raise FileFormatError(beside, "joint_order: " + str(UnknownNameError("moving joint", name, moving)))
+        wanted = [name for name in sidecar.joint_order if name in moving]
+        if sorted(wanted) != sorted(moving):
+            raise FileFormatError(beside, f"joint_order: must name each of the {len(moving)} moving joints once")
+        return _depth_first(self.tree, {name: k for k, name in enumerate(wanted)}, wanted, beside)
+
+    def joint(self, joint: JointEntry) -> None:
+        parent, M, frame = self.link[joint.parent]
+        placement = M @ joint.placement if not np.array_equal(M, np.eye(4)) else joint.placement
+        if joint.kind == "fixed":
+            fixed = pin.Frame(joint.name, parent, frame, pin.SE3(placement), pin.FrameType.FIXED_JOINT)
+            self.body(joint.child, parent, placement, self.pin.addFrame(fixed))
+            return
+        if joint.mimic:
+            problem = "<mimic> is not supported; remove it to leave the joint free, or make the joint FIXED under"
+            raise FileFormatError(self.urdf, f"joint {joint.name!r}: {problem} joint_name / joint_type in the sidecar")
+        inertia = self.tree.links[joint.child].inertia
+        if inertia is not None and inertia.mass == 0.0:
+            problem = f"link {joint.child!r}: mass = 0 on a moving link; give it a mass, or leave <inertial> out"
+            raise FileFormatError(self.urdf, problem + " if it is meant to be massless")
+        j = self.pin.addJoint(parent, joint_model(joint.kind, joint.axis), pin.SE3(placement), joint.name)
+        self.pin.addJointFrame(j, frame)
+        set_default_limits(self.pin, j, joint.kind)
+        for word, values in joint.data.items():
+            _set_entry(self.pin, j, word, np.array(values))
+        self.body(joint.child, j, np.eye(4), self.pin.nframes - 1)
+
+    def body(self, link: str, joint: int, placement: Array, frame: int) -> None:
+        self.pin.addBodyFrame(link, joint, pin.SE3(placement), frame)
+        self.link[link] = (joint, placement, self.pin.nframes - 1)
+        inertia = self.tree.links[link].inertia
+        if inertia is not None:
+            self.inertias.setdefault(joint, []).append((placement, inertia))
+
+
+def _depth_first(tree: TreeEntry, rank: dict[str, int], wanted: list[str], beside: Path) -> list[str]:
+    """Return all joints so that the moving ones come in the wanted order and fixed ones right after their parent."""
+    children: dict[str, list[str]] = {}
+    for name in joint_order(tree):
+        children.setdefault(tree.joints[name].parent, []).append(name)
+    first: dict[str, int] = {}
+    for name in reversed(joint_order(tree)):
+        below = [first[child] for child in children.get(tree.joints[name].child, [])]
+        first[name] = rank.get(name, min(below, default=-1))
+    order: list[str] = []
+    stack = sorted(children.get(tree.root, []), key=first.__getitem__, reverse=True)
+    while stack:
+        order.append(stack.pop())
+        stack.extend(sorted(children.get(tree.joints[order[-1]].child, []), key=first.__getitem__, reverse=True))
+    if [name for name in order if name in rank] != wanted:
+        problem = "joint_order: must go through the tree depth first (each joint before the joints it carries, one"
+        raise FileFormatError(beside, problem + " branch finished before the next begins)")
+    return order
+
+
+def joint_model(kind: str, axis: Array) -> object:
+    """Return Pinocchio's joint of a kind; an axis along x, y or z gets the aligned joint."""
+    if kind in _OTHERS:
+        return _OTHERS[kind]()
+    which = _AXES.get((float(axis[0]), float(axis[1]), float(axis[2])))
+    if which is not None:
+        return _ALIGNED[kind][which]()
+    return _UNALIGNED[kind](np.array(axis))
+
+
+def set_default_limits(model: pin.Model, j: int, kind: str) -> None:
+    """Give coordinates that are sines, cosines or quaternions the bounds that Pinocchio's reader gives them."""
+    angular = {"continuous": 2, "planar": 2, "floating": 4, "SPHERICAL": 4}.get(kind, 0)
+    stop = model.idx_qs[j] + model.nqs[j]
+    model.lowerPositionLimit[stop - angular : stop] = -1.01
+    model.upperPositionLimit[stop - angular : stop] = 1.01
+
+
+def _merged(parts: list[tuple[Array, pin.Inertia]]) -> pin.Inertia:
+    total: pin.Inertia | None = None
+    for placement, inertia in parts:
+        moved = inertia if np.array_equal(placement, np.eye(4)) else pin.SE3(placement).act(inertia)
+        total = moved if total is None else total + moved
+    return total
+
+
+def _set_data(model: pin.Model, name: str, entries: Mapping[str, list[float]], beside: Path) -> None:
+    if not model.existJointName(name):
+        known = list(model.names)[1:]
+        raise FileFormatError(beside, "joint_data: " + str(UnknownNameError("joint", name, known)))
+    j = model.getJointId(name)
+    for word, values in sorted(entries.items()):
+        count = model.nqs[j] if word in ("lower", "upper") else model.nvs[j]
+        if len(values) != count:
+            problem = f"{word} has {len(values)} values; the joint has {count}"
+            raise FileFormatError(beside, f"joint_data of {name}: {problem}")
+        if word in ("armature", "damping", "friction", "rotor_inertia") and min(values) < 0.0:
+            raise FileFormatError(beside, f"joint_data of {name}: {word} = {values} must not be negative")
+        _set_entry(model, j, word, np.array(values))
+
+
+def _set_entry(model: pin.Model, j: int, word: str, values: Array) -> None:
+    q = slice(model.idx_qs[j], model.idx_qs[j] + model.nqs[j])
+    v = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+    getattr(model, DATA_FIELDS[word])[q if word in ("lower", "upper") else v] = values
+    mirrored = {"effort": "lowerEffortLimit", "velocity": "lowerVelocityLimit", "friction": "lowerDryFrictionLimit"}
+    if word in mirrored:
+        getattr(model, mirrored[word])[v] = -values

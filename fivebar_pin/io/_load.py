@@ -1,0 +1,215 @@
+"""Loading a mechanism from files: a URDF with its sidecar, or an MJCF file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from fivebar_pin._arrays import checked
+from fivebar_pin.chain import ClosedChain, Visual
+from fivebar_pin.closures import Closure
+from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
+from fivebar_pin.io._build import build_model
+from fivebar_pin.io._files import MAX_BYTES, as_path
+from fivebar_pin.io._sidecar import Sidecar, read_sidecar
+from fivebar_pin.io._tree import TreeEntry
+from fivebar_pin.io._urdf import read_urdf
+
+__all__ = ["load"]
+
+
+def load(
+    path: object,
+    *,
+    free_flyer: bool = False,
+    closures: Iterable[Closure] | None = None,
+    actuated: Iterable[str] | None = None,
+    gravity: npt.ArrayLike | None = None,
+    max_bytes: int = MAX_BYTES,
+) -> ClosedChain:
+    """Load a closed chain.
+
+    Args:
+        path: a folder with one URDF (and its sidecar) or one MJCF file; a .urdf file whose sidecar lies beside it
+            under the same name (.yaml or .yml), or as the folder's only sidecar; or an MJCF .xml file.
+        free_flyer: put the root of a URDF on a free-flying base.
+        closures: use these instead of the file's closures; with `actuated`, no sidecar is needed.
+        actuated: drive these joints instead of the file's.
+        gravity: use this (3,) [m/s2] instead of the file's.
+        max_bytes: size above which a URDF or MJCF file is not read.
+
+    Returns:
+        The chain; meshes are named in its visuals but not read.
+
+    Raises:
+        FileFormatError: a file is missing, malformed or states something impossible; names file, element, way out.
+        InvalidInputError, UnknownNameError: an argument of this call is wrong.
+    """
+    where = as_path(path)
+    file = _mechanism_file(where)
+    given_closures = None if closures is None else _closures(closures)
+    given_actuated = None if actuated is None else _names(actuated)
+    if file.suffix.lower() == ".xml":
+        from fivebar_pin.io._mjcf import read_mjcf
+
+        if free_flyer:
+            raise InvalidInputError(
+                "free_flyer", free_flyer, "is for URDF files; an MJCF file states <freejoint/> itself"
+            )
+        chain = read_mjcf(file, closures=given_closures, actuated=given_actuated, max_bytes=max_bytes)
+    else:
+        chain = _load_urdf(file, free_flyer, given_closures, given_actuated, max_bytes)
+    return chain if gravity is None else chain.with_gravity(checked("gravity", gravity, (3,)))
+
+
+def _closures(closures: Iterable[Closure]) -> tuple[Closure, ...]:
+    given = tuple(closures)
+    for closure in given:
+        if not isinstance(closure, Closure):
+            raise InvalidInputError("closures", closure, "must be Closure objects")
+    return given
+
+
+def _names(actuated: Iterable[str]) -> tuple[str, ...]:
+    names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
+    for name in names:
+        if not isinstance(name, str):
+            raise InvalidInputError("actuated", name, "must be joint names")
+    return names
+
+
+def _mechanism_file(path: Path) -> Path:
+    """Return the URDF or MJCF file that `path` means."""
+    try:
+        is_folder, exists = path.is_dir(), path.exists()
+    except OSError as error:
+        raise FileFormatError(path, f"cannot be looked at ({error.strerror or error})") from error
+    if not exists:
+        raise FileFormatError(path, "there is no such file or folder")
+    if not is_folder:
+        if path.suffix.lower() not in (".urdf", ".xml"):
+            raise FileFormatError(path, "has an unknown ending; expected a .urdf or MJCF .xml file, or a folder")
+        return path
+    for ending in (".urdf", ".xml"):
+        found = _in_folder(path, (ending,))
+        named = [f for f in found if f.stem in ("robot", path.name)]
+        if len(found) == 1 or len(named) == 1:
+            return (named or found)[0]
+        if found:
+            names = ", ".join(f.name for f in found[:8])
+            raise FileFormatError(path, f"holds {len(found)} {ending} files ({names}); name the one to load")
+    raise FileFormatError(path, "holds no .urdf and no MJCF .xml file")
+
+
+def _in_folder(folder: Path, endings: tuple[str, ...]) -> list[Path]:
+    try:
+        return sorted(f for f in folder.iterdir() if f.suffix.lower() in endings and f.is_file())
+    except OSError as error:
+        raise FileFormatError(folder, f"cannot be listed ({error.strerror or error})") from error
+
+
+def _sidecar_file(urdf: Path) -> Path | None:
+    beside = _in_folder(urdf.parent, (".yaml", ".yml"))
+    same = [f for f in beside if f.stem == urdf.stem]
+    if len(same) > 1:
+        raise FileFormatError(urdf, f"has two sidecars ({', '.join(f.name for f in same)}); keep one")
+    if same:
+        return same[0]
+    alone = len(beside) == 1 and len(_in_folder(urdf.parent, (".urdf",))) == 1
+    return beside[0] if alone else None
+
+
+def _load_urdf(
+    urdf: Path,
+    free_flyer: bool,
+    closures: tuple[Closure, ...] | None,
+    actuated: tuple[str, ...] | None,
+    max_bytes: int,
+) -> ClosedChain:
+    tree = read_urdf(urdf, max_bytes=max_bytes)
+    beside = _sidecar_file(urdf)
+    if beside is None and (closures is None or actuated is None):
+        raise FileFormatError(
+            urdf,
+            f"has no sidecar: put {urdf.stem}.yaml beside it with closed_loop, type and name_mot, or pass closures=... "
+            "and actuated=... (closures=() for an open tree)",
+        )
+    sidecar = Sidecar() if beside is None else read_sidecar(beside)
+    note = beside or urdf
+    model = build_model(tree, sidecar, free_flyer=free_flyer, urdf=urdf, beside=note)
+    if closures is None:
+        check_closures(model, sidecar.closures, note, "closed_loop")
+    if actuated is None:
+        check_actuated(model, tree, sidecar, note)
+    visuals = tuple(v for link in tree.links.values() for v in link.visuals)
+    return make_chain(
+        model,
+        sidecar.closures if closures is None else closures,
+        sidecar.actuated if actuated is None else actuated,
+        visuals,
+        urdf,
+        argument=closures is not None or actuated is not None,
+    )
+
+
+def make_chain(
+    model: pin.Model,
+    closures: tuple[Closure, ...],
+    actuated: tuple[str, ...],
+    visuals: tuple[Visual, ...],
+    file: Path,
+    *,
+    argument: bool,
+) -> ClosedChain:
+    """Return the chain; what is wrong with the file's own content is told as an error of the file."""
+    try:
+        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals)
+    except FileFormatError:
+        raise
+    except FiveBarPinError as error:
+        if argument:
+            raise
+        raise FileFormatError(file, str(error)) from error
+
+
+def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
+    """Refuse closure frames that do not exist, are ambiguous, or lie on one body."""
+    poses: dict[str, list[pin.Frame]] = {}
+    for frame in model.frames:
+        poses.setdefault(frame.name, []).append(frame)
+    for k, closure in enumerate(closures):
+        for name in closure.frames:
+            if name not in poses:
+                raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, poses)}")
+            first, *others = poses[name]
+            for other in others:
+                if other.parentJoint != first.parentJoint or not np.allclose(
+                    other.placement.homogeneous, first.placement.homogeneous, rtol=0.0, atol=1e-12
+                ):
+                    problem = f"the name {name!r} stands for several frames in different places; rename one"
+                    raise FileFormatError(file, f"{key}[{k}]: {problem}")
+        joints = [poses[name][0].parentJoint for name in closure.frames]
+        if joints[0] == joints[1]:
+            body = model.names[joints[0]]
+            raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")
+
+
+def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Path) -> None:
+    """Refuse driven joints that the files do not have, fix, or give several degrees of freedom."""
+    joints = list(model.names)[1:]
+    for k, name in enumerate(sidecar.actuated):
+        if name in sidecar.actuated[:k]:
+            raise FileFormatError(file, f"name_mot: {name!r} is named twice")
+        if name in joints:
+            nv = model.nvs[model.getJointId(name)]
+            if nv != 1:
+                raise FileFormatError(file, f"name_mot: {name!r} has {nv} degrees of freedom; a motor drives one")
+        elif name in tree.joints:
+            how = sidecar.joint_types.get(name, tree.joints[name].kind)
+            raise FileFormatError(file, f"name_mot: {name!r} is not a joint that moves ({how}); it cannot be driven")
+        else:
+            raise FileFormatError(file, "name_mot: " + str(UnknownNameError("joint", name, joints)))

@@ -1,0 +1,256 @@
+"""The sidecar beside a URDF: which frames close loops, which joints are driven, and what URDF cannot say.
+
+Keys that example-parallel-robots uses: ``closed_loop``, ``type``, ``name_mot``, ``joint_name``, ``joint_type``.
+Ours, written only when needed: ``axis`` and ``closure_name`` (one entry per closure), ``gravity``, ``joint_order``,
+``joint_data`` (per joint: armature, limits and losses of joints with several coordinates) and
+``reference_configurations``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
+from fivebar_pin.io._files import read_bounded
+
+__all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "Sidecar", "dump_sidecar", "read_sidecar"]
+
+MAX_SIDECAR_BYTES = 1024 * 1024
+MAX_DEPTH = 20
+
+JOINT_WORDS = ("SPHERICAL", "SPHERICAL_ZYX", "TRANSLATION", "CARDAN", "FIXED")
+"""Joint types a sidecar can give to a joint of the URDF."""
+
+DATA_FIELDS = {
+    "armature": "armature",
+    "damping": "damping",
+    "effort": "upperEffortLimit",
+    "effort_lower": "lowerEffortLimit",
+    "friction": "upperDryFrictionLimit",
+    "gear_ratio": "rotorGearRatio",
+    "lower": "lowerPositionLimit",
+    "rotor_inertia": "rotorInertia",
+    "upper": "upperPositionLimit",
+    "velocity": "upperVelocityLimit",
+}
+DATA_WORDS = tuple(DATA_FIELDS)
+"""What ``joint_data`` can state of a joint, and the field of pin.Model that holds it."""
+
+_KEYS = (
+    "closed_loop", "type", "name_mot", "joint_name", "joint_type", "axis", "closure_name", "gravity", "joint_order",
+    "joint_data", "reference_configurations",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sidecar:
+    """What a sidecar says, checked as far as it can be without the tree."""
+
+    closures: tuple[Closure, ...] = ()
+    actuated: tuple[str, ...] = ()
+    joint_types: Mapping[str, str] = field(default_factory=dict)
+    gravity: tuple[float, ...] | None = None
+    joint_order: tuple[str, ...] | None = None
+    joint_data: Mapping[str, Mapping[str, list[float]]] = field(default_factory=dict)
+    configurations: Mapping[str, list[float]] = field(default_factory=dict)
+
+
+def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
+    """Return what the sidecar says.
+
+    Raises:
+        FileFormatError: not YAML of plain values, an unknown or missing key, or a value of the wrong type.
+    """
+    return _Check(path).sidecar(_plain_yaml(path, max_bytes))
+
+
+def dump_sidecar(sidecar: Sidecar) -> str:
+    """Return the YAML text; every number reads back exactly."""
+    import yaml
+
+    closures = sidecar.closures
+    content: dict[str, Any] = {
+        "closed_loop": [list(c.frames) for c in closures],
+        "type": [c.kind.value for c in closures],
+        "name_mot": list(sidecar.actuated),
+    }
+    if sidecar.joint_types:
+        content["joint_name"] = list(sidecar.joint_types)
+        content["joint_type"] = list(sidecar.joint_types.values())
+    if any(c.kind is ClosureKind.REVOLUTE for c in closures):
+        content["axis"] = [_floats(c.axis) if c.kind is ClosureKind.REVOLUTE else None for c in closures]
+    if any(c.name != Closure(c.frames).name for c in closures):
+        content["closure_name"] = [c.name for c in closures]
+    if sidecar.gravity is not None:
+        content["gravity"] = _floats(sidecar.gravity)
+    if sidecar.joint_order is not None:
+        content["joint_order"] = list(sidecar.joint_order)
+    if sidecar.joint_data:
+        content["joint_data"] = {j: {k: _floats(v) for k, v in d.items()} for j, d in sidecar.joint_data.items()}
+    if sidecar.configurations:
+        content["reference_configurations"] = {k: _floats(v) for k, v in sidecar.configurations.items()}
+    return "".join(
+        yaml.safe_dump({key: value}, default_flow_style=True, width=10**6, allow_unicode=True).strip()[1:-1] + "\n"
+        for key, value in content.items()
+    )
+
+
+def _floats(values: Any) -> list[float]:
+    return [float(v) for v in values]
+
+
+def _plain_yaml(path: Path, max_bytes: int) -> object:
+    """Return the one document of a YAML file, without aliases, tags, doubled keys or deep nests."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        depth = 0
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                raise FileFormatError(path, "uses YAML aliases (*name), which are not read; write the value out")
+            self.depth += 1
+            if self.depth > MAX_DEPTH:
+                raise FileFormatError(path, f"is nested deeper than {MAX_DEPTH}")
+            node = super().compose_node(parent, index)
+            self.depth -= 1
+            return node
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+            doubled = {key for key in keys if keys.count(key) > 1} if len(keys) < 1000 else set()
+            if doubled or len(keys) >= 1000:
+                raise FileFormatError(path, f"states {sorted(doubled)[:5] or 'too many keys'} more than once")
+            return super().construct_mapping(node, deep)
+
+    text = read_bounded(path, max_bytes)
+    try:
+        return yaml.load(text.decode("utf-8"), Loader=Loader)
+    except UnicodeDecodeError as error:
+        raise FileFormatError(path, f"is not UTF-8 text ({error})") from error
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, RecursionError, OverflowError) as error:
+        raise FileFormatError(path, "is not plain YAML (" + " ".join(str(error).split()) + ")") from error
+
+
+class _Check:
+    """Turns plain YAML values into a `Sidecar`, naming the key that is wrong."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def fail(self, key: str, problem: str) -> FileFormatError:
+        return FileFormatError(self.path, f"{key}: {problem}")
+
+    def sidecar(self, content: object) -> Sidecar:
+        if not isinstance(content, dict):
+            raise FileFormatError(self.path, f"holds {_kind(content)}; expected the keys closed_loop, type, name_mot")
+        for key in content:
+            if key not in _KEYS:
+                raise FileFormatError(self.path, str(UnknownNameError("sidecar key", key, _KEYS)))
+        for key in ("closed_loop", "type", "name_mot"):
+            if key not in content:
+                raise self.fail(key, "is missing; write an empty list [] if there are none")
+        gravity, order = content.get("gravity"), content.get("joint_order")
+        return Sidecar(
+            closures=self.closures(content),
+            actuated=tuple(self.names("name_mot", content["name_mot"])),
+            joint_types=self.joint_types(content),
+            gravity=None if gravity is None else tuple(self.numbers("gravity", gravity, 3)),
+            joint_order=None if order is None else tuple(self.names("joint_order", order)),
+            joint_data=self.joint_data(content.get("joint_data")),
+            configurations=self.configurations(content.get("reference_configurations")),
+        )
+
+    def closures(self, content: dict[str, Any]) -> tuple[Closure, ...]:
+        pairs = self.sequence("closed_loop", content["closed_loop"])
+        kinds = self.names("type", content["type"], len(pairs))
+        axes = self.sequence("axis", content.get("axis") or [None] * len(pairs), len(pairs))
+        names = self.names("closure_name", content.get("closure_name") or [""] * len(pairs), len(pairs))
+        closures = []
+        for k, (pair, word, axis, name) in enumerate(zip(pairs, kinds, axes, names, strict=True)):
+            first, second = self.names(f"closed_loop[{k}]", pair, 2)
+            try:
+                kind = ClosureKind.parse(word)
+                if kind is ClosureKind.REVOLUTE and axis is None:
+                    raise self.fail(f"axis[{k}]", "is missing; a revolute closure needs its hinge axis, e.g. [0, 0, 1]")
+                direction = (0.0, 0.0, 1.0) if axis is None else self.numbers(f"axis[{k}]", axis, 3)
+                closures.append(Closure((first, second), kind, direction, name))
+            except FileFormatError:
+                raise
+            except FiveBarPinError as error:
+                raise self.fail(f"closed_loop[{k}]", str(error)) from error
+        return tuple(closures)
+
+    def joint_types(self, content: dict[str, Any]) -> dict[str, str]:
+        names = self.names("joint_name", content.get("joint_name") or [])
+        words = self.names("joint_type", content.get("joint_type") or [], len(names))
+        if len(set(names)) != len(names):
+            raise self.fail("joint_name", "names a joint twice")
+        for word in words:
+            if word.upper() not in JOINT_WORDS:
+                raise self.fail("joint_type", str(UnknownNameError("joint type", word, JOINT_WORDS)))
+        return {name: word.upper() for name, word in zip(names, words, strict=True)}
+
+    def joint_data(self, value: object) -> dict[str, dict[str, list[float]]]:
+        result: dict[str, dict[str, list[float]]] = {}
+        for joint, entries in self.mapping("joint_data", value).items():
+            where = f"joint_data of {joint}"
+            result[joint] = {}
+            for word, numbers in self.mapping(where, entries).items():
+                if word not in DATA_WORDS:
+                    raise self.fail(where, str(UnknownNameError("joint data", word, DATA_WORDS)))
+                result[joint][word] = self.numbers(f"{where}, {word}", numbers)
+        return result
+
+    def configurations(self, value: object) -> dict[str, list[float]]:
+        mapping = self.mapping("reference_configurations", value)
+        return {name: self.numbers(f"reference_configurations of {name}", q) for name, q in mapping.items()}
+
+    def mapping(self, key: str, value: object) -> dict[str, Any]:
+        if value is None:
+            return {}
+        if not isinstance(value, dict) or not all(isinstance(k, str) for k in value):
+            raise self.fail(key, f"must map names to values, is {_kind(value)}")
+        return value
+
+    def sequence(self, key: str, value: object, count: int | None = None) -> list[Any]:
+        if not isinstance(value, list):
+            raise self.fail(key, f"must be a list, is {_kind(value)}")
+        if count is not None and len(value) != count:
+            raise self.fail(key, f"has {len(value)} entries; expected {count}")
+        return value
+
+    def names(self, key: str, value: object, count: int | None = None) -> list[str]:
+        entries = self.sequence(key, value, count)
+        for entry in entries:
+            if not isinstance(entry, str):
+                raise self.fail(key, f"{entry!r} must be a name (text); put it in quotes")
+        return entries
+
+    def numbers(self, key: str, value: object, count: int | None = None) -> list[float]:
+        result = []
+        for entry in self.sequence(key, value, count):
+            number = _number(entry)
+            if number is None or not math.isfinite(number):
+                raise self.fail(key, f"{str(entry)[:40]!r} must be a finite number")
+            result.append(number)
+        return result
+
+
+def _number(entry: object) -> float | None:
+    """Return a number; YAML 1.1 reads 1e-3 (no point) as text, which is taken as the number it is."""
+    if isinstance(entry, bool) or not isinstance(entry, (int, float, str)):
+        return None
+    try:
+        return float(entry)
+    except (ValueError, OverflowError):
+        return None
+
+
+def _kind(value: object) -> str:
+    return "nothing" if value is None else f"a {type(value).__name__}"

@@ -1,0 +1,241 @@
+"""URDF text to a checked tree; nothing reaches Pinocchio that was not understood here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.chain import Visual
+from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.io._files import MAX_BYTES
+from fivebar_pin.io._tree import UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
+from fivebar_pin.io._xml import Reader, parse_xml
+
+__all__ = ["read_urdf"]
+
+_KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+_SHAPES = ("box", "capsule", "cylinder", "sphere", "mesh")
+_GREY = (0.6, 0.6, 0.65, 1.0)
+Colours = dict[str, tuple[float, float, float, float]]
+
+
+def read_urdf(path: Path, *, max_bytes: int = MAX_BYTES) -> TreeEntry:
+    """Return the tree that a URDF file describes.
+
+    Raises:
+        FileFormatError: anything that is not a tree of known joints with finite numbers; names file and element.
+    """
+    robot = parse_xml(path, root="robot", max_bytes=max_bytes)
+    reader = Reader(path)
+    colours = _colours(reader, robot)
+    links: dict[str, LinkEntry] = {}
+    for element in robot.findall("link"):
+        link = _link(reader, element, colours)
+        if link.name in links:
+            raise reader.fail(f"link {link.name!r}", "is defined twice")
+        links[link.name] = link
+    joints: dict[str, JointEntry] = {}
+    for element in robot.findall("joint"):
+        joint = _joint(reader, element)
+        if joint.name in joints:
+            raise reader.fail(f"joint {joint.name!r}", "is defined twice")
+        joints[joint.name] = joint
+    if not links:
+        raise FileFormatError(path, "has no <link>")
+    root = _root(reader, links, joints)
+    return TreeEntry(robot.get("name") or path.stem, root, links, joints)
+
+
+def _root(reader: Reader, links: dict[str, LinkEntry], joints: dict[str, JointEntry]) -> str:
+    parent_joint: dict[str, str] = {}
+    for joint in joints.values():
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                raise reader.fail(f"joint {joint.name!r}", str(UnknownNameError("link", end, links)))
+        if joint.child in parent_joint:
+            raise reader.fail(
+                f"link {joint.child!r}",
+                f"hangs on two joints ({parent_joint[joint.child]!r} and {joint.name!r}); a URDF is a tree: cut the "
+                "loop there and name the two frames under closed_loop in the sidecar",
+            )
+        parent_joint[joint.child] = joint.name
+    roots = [link for link in links if link not in parent_joint]
+    if not roots:
+        raise FileFormatError(reader.path, "has no root link: its joints go round in a circle; cut the loop")
+    if len(roots) > 1:
+        raise FileFormatError(reader.path, f"has {len(roots)} root links ({', '.join(roots[:5])}); a tree has one")
+    reached, front = {roots[0]}, [roots[0]]
+    children: dict[str, list[str]] = {}
+    for joint in joints.values():
+        children.setdefault(joint.parent, []).append(joint.child)
+    while front:
+        new = children.get(front.pop(), [])
+        reached.update(new)
+        front.extend(new)
+    lost = [link for link in links if link not in reached]
+    if lost:
+        raise FileFormatError(reader.path, f"links {', '.join(lost[:5])} go round in a circle apart from the tree")
+    return roots[0]
+
+
+def _origin(reader: Reader, parent: ElementTree.Element, where: str) -> tuple[Array, Array]:
+    element = reader.only(parent, "origin", where)
+    xyz = reader.numbers(element, "xyz", 3, where, [0.0, 0.0, 0.0])
+    rpy = reader.numbers(element, "rpy", 3, where, [0.0, 0.0, 0.0])
+    return np.array(xyz), rpy_to_matrix(rpy)
+
+
+def _homogeneous(xyz: Array, R: Array) -> Array:
+    M = np.eye(4)
+    M[:3, :3], M[:3, 3] = R, xyz
+    return M
+
+
+def _link(reader: Reader, element: ElementTree.Element, colours: Colours) -> LinkEntry:
+    name = reader.text(element, "name", "a <link>")
+    where = f"link {name!r}"
+    inertial = reader.only(element, "inertial", where)
+    visuals = tuple(_visual(reader, visual, name, colours) for visual in element.findall("visual"))
+    return LinkEntry(name, None if inertial is None else _inertia(reader, inertial, where), visuals)
+
+
+def _inertia(reader: Reader, inertial: ElementTree.Element, where: str) -> pin.Inertia:
+    com, R = _origin(reader, inertial, where)
+    mass_element, tensor = reader.only(inertial, "mass", where), reader.only(inertial, "inertia", where)
+    if mass_element is None or tensor is None:
+        raise reader.fail(where, "<inertial> needs <mass> and <inertia>; leave <inertial> out for a massless link")
+    (mass,) = reader.numbers(mass_element, "value", 1, where, None)
+    if mass < 0.0:
+        raise reader.fail(where, f"mass = {mass!r} must not be negative [kg]")
+    words = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    xx, xy, xz, yy, yz, zz = (reader.numbers(tensor, word, 1, where, None)[0] for word in words)
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if not np.array_equal(R, np.eye(3)):
+        inertia = R @ inertia @ R.T
+        inertia = 0.5 * (inertia + inertia.T)
+    return _pin_inertia(mass, com, inertia)
+
+
+def _pin_inertia(mass: float, com: Array, inertia: Array) -> pin.Inertia:
+    """Return the inertia as stated, plausible or not: whether a body can exist is for the diagnosis to tell."""
+    result = pin.Inertia.Zero()
+    result.mass, result.lever, result.inertia = mass, com, inertia
+    return result
+
+
+def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
+    name = reader.text(element, "name", "a <joint>")
+    where = f"joint {name!r}"
+    kind = reader.text(element, "type", where)
+    if kind not in _KINDS:
+        raise reader.fail(where, str(UnknownNameError("joint type", kind, _KINDS)))
+    ends = []
+    for tag in ("parent", "child"):
+        end = reader.only(element, tag, where)
+        if end is None:
+            raise reader.fail(where, f"needs <{tag} link=...>")
+        ends.append(reader.text(end, "link", where))
+    if ends[0] == ends[1]:
+        raise reader.fail(where, f"joins link {ends[0]!r} to itself")
+    placement = _homogeneous(*_origin(reader, element, where))
+    axis = _axis(reader, element, kind, where)
+    data = _joint_data(reader, element, kind, where)
+    return JointEntry(name, kind, ends[0], ends[1], placement, axis, data, element.find("mimic") is not None)
+
+
+def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> Array:
+    axis = np.array(reader.numbers(reader.only(element, "axis", where), "xyz", 3, where, [1.0, 0.0, 0.0]))
+    if kind in ("fixed", "floating"):
+        return axis
+    length = float(np.linalg.norm(axis))
+    if not 1e-9 < length < 1e9:
+        raise reader.fail(where, f"axis {axis.tolist()} has no direction")
+    if kind == "planar" and not np.array_equal(axis / length, [0.0, 0.0, 1.0]):
+        raise reader.fail(where, "a planar joint must have the axis 0 0 1; turn its <origin> instead")
+    return axis if abs(length - 1.0) < 4e-16 else axis / length
+
+
+def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> dict[str, list[float]]:
+    if kind not in ("revolute", "continuous", "prismatic"):
+        return {}
+    limit, dynamics = reader.only(element, "limit", where), reader.only(element, "dynamics", where)
+    data = {
+        "damping": reader.numbers(dynamics, "damping", 1, where, [0.0]),
+        "friction": reader.numbers(dynamics, "friction", 1, where, [0.0]),
+    }
+    if limit is None:
+        if kind != "continuous":
+            raise reader.fail(where, "needs <limit lower= upper= effort= velocity=>")
+        return {**data, "effort": [UNLIMITED], "velocity": [UNLIMITED]}
+    for word in ("effort", "velocity"):
+        data[word] = reader.numbers(limit, word, 1, where, None)
+        if data[word][0] < 0.0:
+            raise reader.fail(where, f"{word} limit = {data[word][0]!r} must not be negative")
+    if kind != "continuous":
+        data["lower"] = reader.numbers(limit, "lower", 1, where, [0.0])
+        data["upper"] = reader.numbers(limit, "upper", 1, where, [0.0])
+        if data["lower"][0] > data["upper"][0]:
+            raise reader.fail(where, f"lower limit {data['lower'][0]!r} is above upper {data['upper'][0]!r}")
+    return data
+
+
+def _colours(reader: Reader, robot: ElementTree.Element) -> Colours:
+    colours: Colours = {}
+    for material in robot.findall("material"):
+        colour = material.find("color")
+        if colour is not None and material.get("name"):
+            colours[str(material.get("name"))] = _rgba(reader, colour, f"material {material.get('name')!r}")
+    return colours
+
+
+def _rgba(reader: Reader, colour: ElementTree.Element, where: str) -> tuple[float, float, float, float]:
+    r, g, b, a = reader.numbers(colour, "rgba", 4, where, None)
+    return r, g, b, a
+
+
+def _visual(reader: Reader, element: ElementTree.Element, link: str, colours: Colours) -> Visual:
+    where = f"visual of link {link!r}"
+    geometry = reader.only(element, "geometry", where)
+    if geometry is None or len(geometry) != 1:
+        raise reader.fail(where, "needs one <geometry> with one shape in it")
+    shape = geometry[0]
+    mesh = ""
+    if shape.tag == "box":
+        size = reader.numbers(shape, "size", 3, where, None)
+    elif shape.tag in ("cylinder", "capsule"):
+        size = [*reader.numbers(shape, "radius", 1, where, None), *reader.numbers(shape, "length", 1, where, None)]
+    elif shape.tag == "sphere":
+        size = reader.numbers(shape, "radius", 1, where, None)
+    elif shape.tag == "mesh":
+        mesh = _mesh_file(reader.path, reader.text(shape, "filename", where))
+        size = reader.numbers(shape, "scale", 3, where, [1.0, 1.0, 1.0])
+    else:
+        raise reader.fail(
+            where, str(UnknownNameError("shape", shape.tag, ("box", "capsule", "cylinder", "sphere", "mesh")))
+        )
+    material = element.find("material")
+    rgba = _GREY
+    if material is not None:
+        colour = material.find("color")
+        known = colours.get(material.get("name") or "", _GREY)
+        rgba = known if colour is None else _rgba(reader, colour, where)
+    return Visual(link, shape.tag, tuple(size), _homogeneous(*_origin(reader, element, where)), rgba, mesh)
+
+
+def _mesh_file(urdf: Path, filename: str) -> str:
+    """Return where the mesh is when it can be found, else what the file calls it."""
+    if filename.startswith("package://"):
+        rest = filename[len("package://") :]
+        candidates = [folder / rest for folder in urdf.resolve().parents]
+    elif filename.startswith("file://"):
+        candidates = [Path(filename[len("file://") :])]
+    else:
+        candidates = [urdf.parent / filename]
+    try:
+        return next((str(c) for c in candidates if c.is_file()), filename)
+    except (OSError, ValueError):
+        return filename

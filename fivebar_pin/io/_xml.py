@@ -1,0 +1,109 @@
+"""XML from strangers: no document types, no entities, bounded depth and size, numbers that are numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+from fivebar_pin.errors import FileFormatError
+from fivebar_pin.io._files import MAX_BYTES, read_bounded
+
+__all__ = ["Reader", "parse_xml"]
+
+MAX_DEPTH = 200
+MAX_ELEMENTS = 200_000
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """A tree builder that refuses what a mechanism file never needs."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path, self._depth, self._count = path, 0, 0
+
+    def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
+        self._depth, self._count = self._depth + 1, self._count + 1
+        if self._depth > MAX_DEPTH:
+            raise FileFormatError(self._path, f"elements are nested deeper than {MAX_DEPTH}")
+        if self._count > MAX_ELEMENTS:
+            raise FileFormatError(self._path, f"has more than {MAX_ELEMENTS} elements")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Refuse the declaration that entity bombs live in."""
+        raise FileFormatError(self._path, "has a DOCTYPE or entities, which are not read; remove the declaration")
+
+
+def parse_xml(path: Path, *, root: str, max_bytes: int = MAX_BYTES) -> ElementTree.Element:
+    """Return the root element of a file whose root tag must be `root`.
+
+    Raises:
+        FileFormatError: not readable, not well formed, hostile, or another kind of file.
+    """
+    parser = ElementTree.XMLParser(target=_Builder(path))
+    try:
+        parser.feed(read_bounded(path, max_bytes))
+        element = parser.close()
+    except FileFormatError:
+        raise
+    except (ElementTree.ParseError, LookupError, ValueError, RecursionError) as error:
+        raise FileFormatError(path, f"is not well-formed XML ({error})") from error
+    if not isinstance(element, ElementTree.Element) or element.tag != root:
+        raise FileFormatError(path, f"has the root element <{getattr(element, 'tag', None)}>; expected <{root}>")
+    return element
+
+
+class Reader:
+    """Reads attributes of elements of one file; every refusal names the file and the element."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def fail(self, where: str, problem: str) -> FileFormatError:
+        """Return the error for an element."""
+        return FileFormatError(self.path, f"{where}: {problem}")
+
+    def text(self, element: ElementTree.Element, attribute: str, where: str) -> str:
+        """Return a required attribute that is not empty."""
+        value = element.get(attribute)
+        if value is None or not value.strip():
+            raise self.fail(where, f"<{element.tag}> needs the attribute {attribute!r}")
+        return value
+
+    def numbers(
+        self, element: ElementTree.Element | None, attribute: str, count: int, where: str, default: list[float] | None
+    ) -> list[float]:
+        """Return `count` finite numbers; `default` (None: required) stands for an absent attribute."""
+        text = None if element is None else element.get(attribute)
+        if text is None:
+            if default is None:
+                raise self.fail(where, f"needs the attribute {attribute!r}")
+            return list(default)
+        words = text.split()
+        if len(words) != count:
+            raise self.fail(where, f"{attribute} = {text!r} must be {count} number(s)")
+        return [self.number(word, attribute, where) for word in words]
+
+    def number(self, word: str, attribute: str, where: str) -> float:
+        """Return one finite number."""
+        if not _NUMBER.fullmatch(word):
+            raise self.fail(where, f"{attribute} holds {word[:40]!r}, which is not a finite number")
+        value = float(word)
+        if not math.isfinite(value):
+            raise self.fail(where, f"{attribute} holds {word[:40]!r}, which is out of range")
+        return value
+
+    def only(self, element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element | None:
+        """Return the only child with this tag, or None; two are an error."""
+        found = element.findall(tag)
+        if len(found) > 1:
+            raise self.fail(where, f"has {len(found)} <{tag}> elements; expected at most one")
+        return found[0] if found else None
