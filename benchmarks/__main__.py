@@ -1,0 +1,31 @@
+"""Run the benchmarks and print their tables."""
+
+from __future__ import annotations
+
+import argparse
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks import roads
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--samples", type=int, nargs="+", default=[1, 100, 1000, 100000])
+    chosen = parser.parse_args()
+    console = Console(width=150)
+    _show(console, "Five-bar, torque and shaking wrench, per sample", roads.HEADINGS, roads.rows(tuple(chosen.samples)))
+
+
+def _show(console: Console, title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    table = Table(title=title)
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if k else "left")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()
