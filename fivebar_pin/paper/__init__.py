@@ -1,6 +1,34 @@
-"""The paper's planar five-bar in closed form."""
+"""The paper's planar five-bar in closed form: parameters, dynamics, matrices, balancing, errata."""
 
+from fivebar_pin.paper import matrices
+from fivebar_pin.paper.audit import audit_table_1
+from fivebar_pin.paper.compare import Comparison, compare_complements
+from fivebar_pin.paper.equations import Conditions, conditions
+from fivebar_pin.paper.erratum import Erratum, errata
 from fivebar_pin.paper.linkage import AssemblyMode, FiveBar, default_motion, table_1
+from fivebar_pin.paper.optimum import Optimum, balance, balance_masses
 from fivebar_pin.paper.solution import Solution, solve, solve_states
+from fivebar_pin.paper.velocity_ratios import ratio_rates, ratios
 
-__all__ = ["AssemblyMode", "FiveBar", "Solution", "default_motion", "solve", "solve_states", "table_1"]
+__all__ = [
+    "AssemblyMode",
+    "Comparison",
+    "Conditions",
+    "Erratum",
+    "FiveBar",
+    "Optimum",
+    "Solution",
+    "audit_table_1",
+    "balance",
+    "balance_masses",
+    "compare_complements",
+    "conditions",
+    "default_motion",
+    "errata",
+    "matrices",
+    "ratio_rates",
+    "ratios",
+    "solve",
+    "solve_states",
+    "table_1",
+]

@@ -1,0 +1,248 @@
+"""The paper's balanced linkage: the optimum of (77)-(80), in its 8 variables and in the conclusion's 12."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin.errors import InfeasibleError, InvalidInputError, SolverError
+from fivebar_pin.paper.equations import Conditions, conditions
+from fivebar_pin.paper.linkage import FiveBar
+from fivebar_pin.paper.polar import Problem, Stationary, climb
+from fivebar_pin.paper.rings import common_points
+
+__all__ = ["Optimum", "balance", "balance_masses"]
+
+Bounds = tuple[npt.ArrayLike, npt.ArrayLike]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Optimum:
+    """A force balanced linkage that minimises (77), and the evidence that it does.
+
+    Attributes:
+        linkage: the balanced linkage; lengths and inertias about the mass centres are those given.
+        objective: (77) [-].
+        weights: w_alpha, w_rho.
+        conditions: residuals of (60)-(63), (68)-(71).
+        multipliers: of the conditions: (6,), or (7,) when the masses are free.
+        bound_multipliers: of active bounds on alpha (none), rho and mu (12,); zero elsewhere.
+        kkt_residual: largest violation of the optimality conditions [-].
+        curvature: least eigenvalue of the Lagrangian's Hessian along the conditions; positive: a strict minimum.
+        starts: how many starting points were tried.
+        reached: how many of them led to a minimum.
+        minima: objectives of the distinct minima found, ascending; the first is `objective`.
+    """
+
+    linkage: FiveBar
+    objective: float
+    weights: tuple[float, float]
+    conditions: Conditions
+    multipliers: Array
+    bound_multipliers: Array
+    kkt_residual: float
+    curvature: float
+    starts: int
+    reached: int
+    minima: tuple[float, ...]
+
+    @property
+    def residuals(self) -> Array:
+        """Residuals of the seven equations (7,) [-]."""
+        return self.conditions.residuals
+
+    def __repr__(self) -> str:
+        return (
+            f"Optimum(rho={self.linkage.rho.tolist()}, alpha={self.linkage.alpha.tolist()}, "
+            f"objective={self.objective:.6g}, kkt_residual={self.kkt_residual:.1e}, "
+            f"{self.reached} of {self.starts} starts reached a minimum)"
+        )
+
+
+def balance(
+    linkage: FiveBar,
+    *,
+    weights: tuple[float, float] = (0.5, 0.5),
+    rho_bounds: Bounds | None = None,
+    tolerance: float = 1e-12,
+) -> Optimum:
+    """Return the optimum of (77)-(79) in alpha_i and rho_i, the masses being those of the linkage.
+
+    Once l_1 is chosen, the conditions give the other l_i: the feasible set is a plane. It is searched for starting
+    points with every link on either side of its joint; from each, SLSQP and then Newton on the KKT system. The best of
+    the minima that pass the tolerance is returned.
+
+    Args:
+        linkage: gives lengths, masses and inertias; its rho and alpha do not matter.
+        weights: w_alpha and w_rho, positive, with sum 1, (78).
+        rho_bounds: lowest and highest rho, scalars or (4,) each [-]; rho may be negative unless they say otherwise.
+        tolerance: bound on the KKT residual [-].
+
+    Raises:
+        InvalidInputError: weights outside (78), bounds in the wrong order.
+        InfeasibleError: no linkage within the bounds is balanced.
+        SolverError: no start reached a minimum.
+    """
+    mu = linkage.mass_ratios
+    problem = _problem(weights, rho_bounds, (mu, mu))
+    starts = _starts(problem, mu)
+    return _best(linkage, problem, starts, tolerance, float(linkage.masses.sum()))
+
+
+def balance_masses(
+    linkage: FiveBar,
+    *,
+    mass_bounds: Bounds,
+    total_mass: float | None = None,
+    weights: tuple[float, float] = (0.5, 0.5),
+    rho_bounds: Bounds | None = None,
+    tolerance: float = 1e-12,
+) -> Optimum:
+    """Return the optimum of (77) in all twelve variables alpha_i, rho_i, mu_i, under (70) and (71).
+
+    The inequalities (71) are open: without bounds the best linkage would have links of no mass, so bounds are needed.
+
+    Args:
+        linkage: gives lengths, inertias, and the total mass unless given.
+        mass_bounds: lowest and highest mass of each link, scalars or (4,) each [kg]; the lowest must be positive.
+        total_mass: sum of the four masses [kg].
+        weights, rho_bounds, tolerance: as for `balance`.
+
+    Raises:
+        InvalidInputError: weights outside (78), bounds in the wrong order or not positive.
+        InfeasibleError: the mass bounds do not allow the total mass, or no mass distribution tried can be balanced.
+        SolverError: no start reached a minimum.
+    """
+    total = float(linkage.masses.sum()) if total_mass is None else float(total_mass)
+    if not (np.isfinite(total) and total > 0.0):
+        raise InvalidInputError("total_mass", total, "must be positive and finite [kg]")
+    low, high = _bounds("mass_bounds", mass_bounds)
+    if np.any(low <= 0.0):
+        raise InvalidInputError("mass_bounds[0]", low.tolist(), "must be positive, (71) [kg]")
+    if low.sum() > total or high.sum() < total:
+        raise InfeasibleError(
+            f"Masses between {low.tolist()} and {high.tolist()} kg add up to between {low.sum():g} and {high.sum():g} "
+            f"kg, never to the total mass of {total:g} kg. Change mass_bounds or total_mass."
+        )
+    problem = _problem(weights, rho_bounds, (low / total, np.minimum(high / total, 1.0)))
+    starts: list[Array] = []
+    reasons: list[InfeasibleError] = []
+    for mu in _mixtures(problem.low[8:], problem.high[8:]):
+        try:
+            starts += _starts(problem, mu)[:6]
+        except InfeasibleError as error:
+            reasons.append(error)
+    if not starts:
+        raise InfeasibleError(f"No mass distribution tried can be balanced within rho_bounds. {reasons[0]}")
+    return _best(linkage, problem, starts, tolerance, total)
+
+
+def _problem(weights: tuple[float, float], rho_bounds: Bounds | None, mu: tuple[Array, Array]) -> Problem:
+    w = checked("weights", weights, (2,))
+    if np.any(w <= 0.0) or np.any(w >= 1.0) or abs(w.sum() - 1.0) > 1e-9:
+        raise InvalidInputError("weights", w.tolist(), "must lie between 0 and 1 and add up to 1, (78)")
+    low, high = np.full(12, -np.inf), np.full(12, np.inf)
+    if rho_bounds is not None:
+        low[4:8], high[4:8] = _bounds("rho_bounds", rho_bounds)
+    low[8:], high[8:] = mu
+    return Problem((float(w[0]), float(w[1])), frozen(low), frozen(high))
+
+
+def _bounds(name: str, bounds: Bounds) -> tuple[Array, Array]:
+    pair = []
+    for side, values in zip(("[0]", "[1]"), bounds, strict=True):
+        array = np.broadcast_to(np.asarray(values, dtype=np.float64), (4,)) if np.ndim(values) == 0 else values
+        pair.append(checked(name + side, array, (4,)))
+    low, high = pair
+    if np.any(low > high):
+        raise InvalidInputError(name, [low.tolist(), high.tolist()], "the lowest must not exceed the highest")
+    return low, high
+
+
+def _starts(problem: Problem, mu: Array) -> list[Array]:
+    """Return the best balanced points for each choice of the side of every joint, best first.
+
+    mu2 l2 = s is the free complex number; |l_i| within its bounds makes a ring about -shift_i for s.
+    """
+    shift = np.array([-mu[1], 0.0, mu[2], mu[2] + mu[3]])  # mu_i l_i = s + shift_i
+    low, high = problem.low[4:8], problem.high[4:8]
+    inner = np.where((low <= 0.0) & (high >= 0.0), 0.0, np.minimum(np.abs(low), np.abs(high)))
+    outer = np.maximum(np.abs(low), np.abs(high))
+    s = _grid(shift)
+    corners, violation = common_points(-shift, mu * inner, mu * outer)
+    if violation > 1e-12:
+        raise InfeasibleError(
+            f"No balanced linkage has rho between {low.tolist()} and {high.tolist()} with the mass ratios "
+            f"{np.round(mu, 6).tolist()}: the bounds would have to give way by {violation:.3g} in mu rho. "
+            "Widen rho_bounds or change the masses."
+        )
+    s = np.concatenate([s, corners])
+    l = (s[:, None] + shift) / mu
+    starts = []
+    for sides in product((0.0, np.pi), repeat=4):
+        alpha = np.angle(l * np.exp(1j * np.array(sides)))
+        rho = (l * np.exp(-1j * alpha)).real
+        inside = np.all((rho >= low - 1e-9) & (rho <= high + 1e-9), axis=1)
+        value = problem.weights[0] * np.sum(alpha**2, axis=1) + problem.weights[1] * np.sum((rho - 0.5) ** 2, axis=1)
+        if inside.any():
+            k = int(np.argmin(np.where(inside, value, np.inf)))
+            starts.append((float(value[k]), np.concatenate([alpha[k], rho[k], mu])))
+    return [x for _, x in sorted(starts, key=lambda pair: pair[0])]
+
+
+def _grid(shift: Array) -> npt.NDArray[np.complex128]:
+    """Return points around the centres where single l_i vanish, closer where they lie."""
+    span = 2.0 * float(np.ptp(shift))
+    x = np.concatenate([-np.geomspace(1e-3, 1.0, 16)[::-1], [0.0], np.geomspace(1e-3, 1.0, 16)]) * span
+    around = (x[:, None] + 1j * x[None, :]).ravel()
+    return np.asarray((around[None, :] - shift[:, None]).ravel())
+
+
+def _mixtures(low: Array, high: Array) -> list[Array]:
+    """Return mass ratios within the bounds that add up to one: pushed towards each bound, and in the middle."""
+    found = []
+    for lean in product((0.0, 0.5, 1.0), repeat=4):
+        wish = low + np.array(lean) * (high - low)
+        short = 1.0 - wish.sum()
+        room = (high - wish) if short > 0.0 else (wish - low)
+        if room.sum() >= abs(short) > 0.0 or short == 0.0:
+            found.append(wish + (short * room / room.sum() if short else 0.0))
+    rows = {tuple(np.round(mu, 9)): mu for mu in found}
+    return list(rows.values())[:: max(1, len(rows) // 12)]
+
+
+def _best(linkage: FiveBar, problem: Problem, starts: list[Array], tolerance: float, total: float) -> Optimum:
+    points = [climb(problem, start) for start in starts]
+    minima = [p for p in points if p.residual <= tolerance and p.curvature >= -1e-9]
+    if not minima:
+        nearest: Stationary = min(points, key=lambda p: p.residual)
+        raise SolverError(
+            f"None of {len(starts)} starts reached a minimum: the nearest stops at a KKT residual of "
+            f"{nearest.residual:.3g} (tolerance {tolerance:.3g}). Loosen the tolerance or change the bounds.",
+            residual=nearest.residual,
+            tolerance=tolerance,
+        )
+    minima.sort(key=lambda p: problem.objective(p.x))
+    best = minima[0]
+    values = [problem.objective(p.x) for p in minima]
+    distinct = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > 1e-9 * (1.0 + v)]
+    alpha, rho, mu = best.x[:4], best.x[4:8], best.x[8:]
+    masses = total * mu if problem.free[8:].any() else linkage.masses
+    balanced = replace(linkage, masses=masses, rho=rho, alpha=alpha)
+    return Optimum(
+        linkage=balanced,
+        objective=values[0],
+        weights=problem.weights,
+        conditions=conditions(balanced),
+        multipliers=frozen(best.multipliers),
+        bound_multipliers=frozen(best.bound_multipliers),
+        kkt_residual=best.residual,
+        curvature=best.curvature,
+        starts=len(starts),
+        reached=len(minima),
+        minima=tuple(distinct),
+    )
