@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -42,7 +43,25 @@ class Window:
     def open(self, url: str) -> None:
         """Open a page whose scene is complete when this returns."""
         self.page.goto(url, wait_until="load")
-        self.page.wait_for_function("typeof viewer === 'object' && viewer !== null && viewer.camera.fov === 16")
+        self.until("typeof viewer === 'object' && viewer !== null && viewer.camera.fov === 16")
+
+    def until(self, condition: str, *, seconds: float = 20.0) -> None:
+        """Wait for a condition in the page; playwright's own way of waiting needs eval, which the page forbids."""
+        end = time.monotonic() + seconds
+        while not self._holds(condition):
+            if time.monotonic() > end:
+                pytest.fail(f"the page did not come to {condition} within {seconds} s; errors: {self.errors}")
+            self.page.wait_for_timeout(20)
+
+    def _holds(self, condition: str) -> bool:
+        from playwright.sync_api import Error
+
+        try:
+            return bool(self.page.evaluate(f"() => {{ try {{ return {condition}; }} catch (e) {{ return false; }} }}"))
+        except Error as error:
+            if "Execution context was destroyed" in error.message:  # the page is being loaded anew
+                return False
+            raise
 
     def at(self, seconds: float) -> None:
         """Halt the animation at a playing time [s], picture drawn."""
@@ -81,7 +100,7 @@ _NODES = """() => {
 
 
 @contextmanager
-def chromium(*, width: int = 1280, height: int = 720) -> Iterator[Window]:
+def chromium(*, width: int = 900, height: int = 520) -> Iterator[Window]:
     """Open headless Chromium with a software renderer; it fails the test where there is none."""
     from playwright.sync_api import sync_playwright
 

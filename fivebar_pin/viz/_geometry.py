@@ -97,7 +97,8 @@ def joint_shapes(chain: ClosedChain, q: Array) -> tuple[JointShape, ...]:
     shapes = []
     for j in range(1, model.njoints):
         first, width = model.idx_vs[j], model.nvs[j]
-        S = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL)[:, first : first + width]
+        J = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL)
+        S = np.reshape(J, (6, model.nv))[:, first : first + width]  # a single column comes back flat
         shapes.append(_shape_of(S))
     return tuple(shapes)
 
@@ -173,7 +174,8 @@ def _plane_normal(chain: ClosedChain, q: Array) -> Array | None:
     turns, slides = [], []
     for j in range(1, model.njoints):
         first, width = model.idx_vs[j], model.nvs[j]
-        S = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:, first : first + width]
+        J = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        S = np.reshape(J, (6, model.nv))[:, first : first + width]
         turns += [w / np.linalg.norm(w) for w in S[3:].T if np.linalg.norm(w) > 0.0]
         slides += [u / np.linalg.norm(u) for u, w in zip(S[:3].T, S[3:].T, strict=True) if np.linalg.norm(w) == 0.0]
     normal = turns[0] if turns else _slide_normal(slides)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from fivebar_pin.viz._geometry import JointShape, Poses, View, body_points, join
 from fivebar_pin.viz._record import Colour, Recorder, along, pose
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain
+    from fivebar_pin.chain import ClosedChain, Visual
 
 __all__ = ["COLOURS", "LINK_COLOURS", "Drawing", "amid_ground", "body_names", "draw_mechanism", "reach", "safe"]
 
@@ -39,6 +40,10 @@ COLOURS: dict[str, Colour] = {
 
 _THICKNESS = 0.045
 """Radius of a link, as a part of the chain's characteristic length [-]."""
+
+
+_RIBBON_POINTS = 2000
+"""Points of a trace that are drawn wide; the line itself holds all of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +75,12 @@ class Drawing:
     @property
     def radius(self) -> float:
         """Radius of a link [m]."""
-        return min(_THICKNESS * self.chain.length, 0.04 * self.size)
+        return float(np.clip(_THICKNESS * self.chain.length, 0.008 * self.size, 0.04 * self.size))
+
+    @property
+    def visuals(self) -> tuple[Visual, ...]:
+        """Shapes of the chain that can be drawn: a mesh whose file is missing is left out."""
+        return tuple(v for v in self.chain.visuals if v.shape != "mesh" or Path(v.mesh).is_file())
 
 
 def safe(name: str) -> str:
@@ -100,9 +110,8 @@ def reach(chain: ClosedChain, poses: Poses) -> Array:
 def draw_mechanism(recorder: Recorder, path: str, drawing: Drawing) -> None:
     """Draw all of one mechanism under a path of the scene, in metres and world axes."""
     shapes = joint_shapes(drawing.chain, _neutral(drawing.chain))
-    drawn = {v.frame for v in drawing.chain.visuals}
-    frames = drawing.chain.model.frames
-    dressed = {f.parentJoint for f in frames if f.name in drawn}
+    drawn = {v.frame for v in drawing.visuals}
+    dressed = {f.parentJoint for f in drawing.chain.model.frames if f.name in drawn}
     for j, body in enumerate(body_names(drawing.chain), start=1):
         node = f"{path}/{body}"
         if j not in dressed:
@@ -168,7 +177,7 @@ def _draw_body_com(recorder: Recorder, path: str, drawing: Drawing, joint: int) 
 
 def _draw_visuals(recorder: Recorder, path: str, drawing: Drawing) -> None:
     model = drawing.chain.model
-    for number, visual in enumerate(drawing.chain.visuals):
+    for number, visual in enumerate(drawing.visuals):
         frame = model.frames[model.getFrameId(visual.frame)]
         node = f"{_node(drawing.chain, path, frame.parentJoint)}/visual {number}"
         recorder.place(node, frame.placement.homogeneous)
@@ -232,7 +241,7 @@ def _draw_com(recorder: Recorder, path: str, drawing: Drawing) -> None:
         return
     recorder.line(f"{path}/trace/line", com, COLOURS["com"], on_top=True)
     if float(np.max(np.ptp(com, axis=0))) > 0.05 * r:
-        vertices, faces = _ribbon(com, drawing.view.normal, 0.16 * r)
+        vertices, faces = _ribbon(com[:: 1 + len(com) // _RIBBON_POINTS], drawing.view.normal, 0.16 * r)
         recorder.triangles(f"{path}/trace/ribbon", vertices, faces, COLOURS["com"], on_top=True)
     recorder.sphere(f"{path}/com/ball", 0.9 * r, COLOURS["com"], np.eye(4), on_top=True)
     recorder.set(f"{path}/com/ball", "renderOrder", 3)

@@ -18,6 +18,8 @@ from fivebar_pin.viz._stage import Stage
 
 __all__ = ["describe", "render"]
 
+_MARGIN = 6.0
+"""Room around everything, in radii of the links [-]."""
 _MOST_LINKS = 10
 """Links that the legend names; more are counted only."""
 
@@ -28,10 +30,14 @@ def describe(
     """Return all that the page needs to know, as plain data."""
     start = min(float(d.poses.t[0]) for d in drawings)
     duration = max(float(d.poses.t[-1]) for d in drawings) - start
-    half = [float(x) for x in stage.seen(stage.high)]
+    camera = {
+        "direction": [0.0, 0.0, 1.0] if stage.view.planar else [0.55, 0.42, 1.0],
+        "outline": [[float(x) for x in stage.seen(point)] for point in stage.outline],
+        "margin": stage.scale * max(_MARGIN * d.radius for d in drawings),
+    }
     return {
         "commands": recorder.packed(duration=duration / speed),
-        "camera": {"direction": [0.0, 0.0, 1.0] if stage.view.planar else [0.55, 0.42, 1.0], "half": half},
+        "camera": camera,
         "start": start,
         "duration": duration,
         "speed": speed,
@@ -56,7 +62,8 @@ def render(title: str, scene: Mapping[str, Any], *, live: bool = False) -> str:
 
 def _label(name: str, drawing: Drawing, box: Array, stage: Stage) -> dict[str, Any]:
     """Return the words below a mechanism, where they stand, and the force that runs with the time."""
-    below = np.array([0.5 * (box[0, 0] + box[1, 0]), stage.low[1], 0.5 * (box[0, 2] + box[1, 2])])
+    front = 0.5 * (box[0, 2] + box[1, 2]) if stage.view.planar else box[1, 2]
+    below = np.array([0.5 * (box[0, 0] + box[1, 0]), stage.low[1], front])
     label: dict[str, Any] = {"text": name, "at": [float(x) for x in stage.seen(below)], "times": [], "force": []}
     if drawing.force is not None:
         label["times"] = [float(t) for t in drawing.times]
@@ -87,7 +94,7 @@ def _link_entries(drawing: Drawing) -> list[tuple[str, Colour]]:
     model = drawing.chain.model
     entries = []
     for j, name in enumerate(body_names(drawing.chain), start=1):
-        visuals = [v for v in drawing.chain.visuals if model.frames[model.getFrameId(v.frame)].parentJoint == j]
+        visuals = [v for v in drawing.visuals if model.frames[model.getFrameId(v.frame)].parentJoint == j]
         if not visuals:
             entries.append((name, LINK_COLOURS[(j - 1) % len(LINK_COLOURS)]))
         coloured = dict.fromkeys((v.frame, v.rgba) for v in visuals if max(v.rgba[:3]) > 0.3)
@@ -108,6 +115,9 @@ def _notes(drawings: Sequence[Drawing], stage: Stage) -> list[str]:
         notes.append(f"arrow of one grid cell = {stage.cell / drawings[0].arrow:.3g} N, longest {max(forces):.3g} N")
     elif forces:
         notes.append("no arrow: the shaking force is zero to round-off")
+    missing = {v.mesh for d in drawings for v in d.chain.visuals} - {v.mesh for d in drawings for v in d.visuals}
+    if missing:
+        notes.append(f"{len(missing)} mesh file{'s' if len(missing) > 1 else ''} not found, drawn without")
     return notes
 
 

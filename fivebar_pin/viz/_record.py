@@ -45,6 +45,16 @@ def _hex(rgba: Colour) -> int:
     return (r << 16) | (g << 8) | b
 
 
+def _meshcat() -> Any:
+    """Return meshcat, imported without the deprecation warnings of what it imports in turn."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        import meshcat
+    return meshcat
+
+
 class Recorder:
     """Collects the commands of one scene, in the order they are given.
 
@@ -52,11 +62,9 @@ class Recorder:
     """
 
     def __init__(self) -> None:
-        from meshcat import Visualizer
-
         self._commands: list[dict[str, Any]] = []
         self._tracks: list[dict[str, Any]] = []
-        self._root = Visualizer(window=self)
+        self._root = _meshcat().Visualizer(window=self)
 
     def send(self, command: Any) -> None:
         """Take a command of meshcat's own classes."""
@@ -76,14 +84,12 @@ class Recorder:
 
     def box(self, path: str, size: Sequence[float], rgba: Colour, matrix: Array) -> None:
         """Draw a box of the given edges."""
-        import meshcat.geometry as g
-
+        g = _meshcat().geometry
         self._mesh(path, g.Box(list(size)), rgba, matrix)
 
     def sphere(self, path: str, radius: float, rgba: Colour, matrix: Array, *, on_top: bool = False) -> None:
         """Draw a sphere; on_top: seen through everything else."""
-        import meshcat.geometry as g
-
+        g = _meshcat().geometry
         self._mesh(path, g.Sphere(radius), rgba, matrix, on_top=on_top)
 
     def cylinder(
@@ -98,11 +104,11 @@ class Recorder:
         on_top: bool = False,
     ) -> None:
         """Draw a cylinder along z, or a cone frustum whose far end has tip times the radius."""
-        import meshcat.geometry as g
-
+        g = _meshcat().geometry
         upright = np.eye(4)
         upright[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # the viewer's cylinders lie along y
         shape = g.Cylinder(length, radiusTop=tip * radius, radiusBottom=radius)
+        shape.radialSegments = 28
         self._mesh(path, shape, rgba, matrix @ upright, on_top=on_top)
 
     def capsule(self, path: str, radius: float, length: float, rgba: Colour, matrix: Array) -> None:
@@ -115,14 +121,12 @@ class Recorder:
 
     def triangles(self, path: str, vertices: Array, faces: Array, rgba: Colour, *, on_top: bool = False) -> None:
         """Draw a surface of triangles: vertices (k, 3), faces (m, 3) of vertex numbers."""
-        import meshcat.geometry as g
-
+        g = _meshcat().geometry
         self._mesh(path, g.TriangularMeshGeometry(vertices, faces), rgba, np.eye(4), on_top=on_top)
 
     def line(self, path: str, points: Array, rgba: Colour, *, pairs: bool = False, on_top: bool = False) -> None:
         """Draw a line through points (k, 3), or one segment per two points."""
-        import meshcat.geometry as g
-
+        g = _meshcat().geometry
         geometry = g.PointsGeometry(np.asarray(points, dtype=np.float32).T)
         material = g.LineBasicMaterial(color=_hex(rgba), opacity=rgba[3], **self._depth(rgba, on_top))
         self._root[path].set_object((g.LineSegments if pairs else g.Line)(geometry, material))
@@ -181,8 +185,7 @@ class Recorder:
         return {"type": "set_animation", "animations": animations, "options": options, "path": ""}
 
     def _mesh(self, path: str, geometry: Any, rgba: Colour, matrix: Array, *, on_top: bool = False) -> None:
-        import meshcat.geometry as g
-
+        g = _meshcat().geometry
         material = g.MeshPhongMaterial(color=_hex(rgba), opacity=rgba[3], shininess=12, **self._depth(rgba, on_top))
         self._root[path].set_object(geometry, material)
         self.place(path, matrix)
@@ -202,8 +205,7 @@ def _packed_floats(values: Array) -> Any:
 
 def _read_mesh(file: str) -> Any:
     """Return the geometry of an .obj, .dae or .stl file."""
-    import meshcat.geometry as g
-
+    g = _meshcat().geometry
     readers = {".obj": g.ObjMeshGeometry, ".dae": g.DaeMeshGeometry, ".stl": g.StlMeshGeometry}
     reader = readers.get(Path(file).suffix.lower())
     if reader is None:

@@ -19,6 +19,8 @@ MECHANISMS = "/mechanisms"
 
 _GRID = "/surroundings/grid"
 _GRID_COLOUR: Colour = (0.84, 0.86, 0.89, 1.0)
+_MARGIN = 6.0
+"""Room around a mechanism, in radii of its links [-]."""
 _SIZE = 2.0
 """Size of the scene in the viewer's own units, which suit its lights and its camera."""
 
@@ -32,12 +34,14 @@ class Stage:
         boxes: extent of each mechanism once shifted, lower and upper corner along right, up, normal (k, 2, 3) [m].
         shifts: shift of each mechanism from its own place (k, 3), world axes [m].
         cell: edge of a grid cell [m].
+        outline: points (k, 3) along right, up, normal that the picture has to hold [m].
     """
 
     view: View
     boxes: Array
     shifts: Array
     cell: float
+    outline: Array
 
     @classmethod
     def around(cls, drawings: Sequence[Drawing]) -> Stage:
@@ -46,7 +50,9 @@ class Stage:
         Shifts are whole grid cells, so that the grid means the same for each of them.
         """
         view = drawings[0].view
-        boxes = np.array([_extent(d) for d in drawings])
+        outlines = [_outline(d) for d in drawings]
+        margins = [_MARGIN * d.radius for d in drawings]
+        boxes = np.array([(o.min(axis=0) - m, o.max(axis=0) + m) for o, m in zip(outlines, margins, strict=True)])
         cell = _round_number(0.08 * float(np.max(boxes[:, 1] - boxes[:, 0])))
         steps = np.zeros(len(drawings))
         for k in range(1, len(drawings)):
@@ -54,7 +60,8 @@ class Stage:
             wanted = boxes[k - 1, 1, 0] + gap - boxes[k, 0, 0]
             steps[k] = cell * np.ceil(wanted / cell)
             boxes[k, :, 0] += steps[k]
-        return cls(view, boxes, steps[:, None] * view.right, cell)
+        outline = np.concatenate([o + np.array([step, 0.0, 0.0]) for o, step in zip(outlines, steps, strict=True)])
+        return cls(view, boxes, steps[:, None] * view.right, cell, outline)
 
     @property
     def axes(self) -> Array:
@@ -112,15 +119,16 @@ class Stage:
         return np.array(ends)
 
 
-def _extent(drawing: Drawing) -> Array:
-    """Return the corners (2, 3) of the box that a mechanism needs along right, up, normal, arrow and feet included."""
+def _outline(drawing: Drawing) -> Array:
+    """Return the outermost points (k, 3) that a mechanism passes, along right, up, normal; its arrow included."""
     view = drawing.view
     points = reach(drawing.chain, drawing.poses)
     if drawing.force is not None:
         points = np.concatenate([points, amid_ground(drawing.chain) + drawing.arrow * drawing.force])
-    coordinates = points @ np.array([view.right, view.up, view.normal]).T
-    margin = 6.0 * drawing.radius
-    return np.stack([coordinates.min(axis=0) - margin, coordinates.max(axis=0) + margin])
+    points = points @ np.array([view.right, view.up, view.normal]).T
+    directions = np.random.default_rng(0).normal(size=(64, 3))
+    directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
+    return np.asarray(points[np.unique(np.argmax(directions @ points.T, axis=1))])
 
 
 def _round_number(x: float) -> float:
