@@ -53,7 +53,7 @@ def point(model: pin.Model, joint: int, name: str, placement: pin.SE3) -> str:
 def close_at(
     model: pin.Model, q: np.ndarray, joints: tuple[int, int], kind: str, where: pin.SE3, seed: int = 5
 ) -> fb.Closure:
-    """Return a closure that is closed at q: its frames meet at the world pose `where`, up to what the kind leaves free."""
+    """Return a closure that is closed at q: its frames meet at the world pose `where`, but for what it leaves free."""
     rng = np.random.default_rng(seed)
     data = model.createData()
     pin.forwardKinematics(model, data, q)
