@@ -42,7 +42,6 @@ def links(
     *,
     mode: AssemblyMode = AssemblyMode.LEFT,
     times: Array | None = None,
-    first: int = 0,
 ) -> tuple[CArray, Array, Array]:
     """Return the link vectors b (4, n) [m], X = Im(conj(b2) b3) (n,) [m2] and D = |O2 O4|^2 (n,) [m2].
 
@@ -51,7 +50,6 @@ def links(
         psi, gamma: input angles (n,) [rad].
         mode: which of the two closures.
         times: times (n,) [s] for the messages.
-        first: index of the first sample, for the messages.
 
     Raises:
         AssemblyError: a sample at which the links do not reach.
@@ -77,7 +75,7 @@ def links(
     X2 = a2 * a2 * D
     X2 -= u * u
     if psi.size and X2.min() <= (SINGULAR * a2 * a3) ** 2:
-        _refuse(linkage, np.sqrt(D), X2, times, first)
+        _refuse(linkage, np.sqrt(D), X2, times)
     np.sqrt(X2, out=X)
     if AssemblyMode.parse(mode) is AssemblyMode.RIGHT:
         np.negative(X, out=X)
@@ -146,7 +144,7 @@ def sigma(linkage: FiveBar, X: npt.ArrayLike) -> Array:
     return np.asarray(sine / np.sqrt(1.0 + np.sqrt(1.0 - sine * sine)))
 
 
-def _refuse(linkage: FiveBar, reach: Array, X2: Array, times: Array | None, first: int) -> None:
+def _refuse(linkage: FiveBar, reach: Array, X2: Array, times: Array | None) -> None:
     """Raise for the worst of the samples whose loop does not close, or else for the first singular one."""
     a2, a3 = float(linkage.lengths[1]), float(linkage.lengths[2])
     small = (SINGULAR * a2 * a3) ** 2
@@ -156,24 +154,24 @@ def _refuse(linkage: FiveBar, reach: Array, X2: Array, times: Array | None, firs
         k = int(np.argmax(gap))
         far = reach[k] > a2 + a3
         raise AssemblyError(
-            f"The linkage cannot be assembled at {_where(k, times, first)}: O2 and O4 are {reach[k]:.6g} m apart, "
+            f"The linkage cannot be assembled at {_where(k, times)}: O2 and O4 are {reach[k]:.6g} m apart, "
             + (f"links 2 and 3 reach {a2 + a3:.6g} m" if far else f"links 2 and 3 need {abs(a2 - a3):.6g} m")
             + f"; the loop stays open by {gap[k]:.3g} m ({int(np.sum(open_))} of {reach.size} samples fail). "
             "Change the lengths or the range of psi and gamma.",
             closure="O3",
             residual=float(gap[k]),
-            sample=first + k,
+            sample=k,
             time=None if times is None else float(times[k]),
         )
     k = int(np.flatnonzero(X2 - small <= 0.0)[0])
     raise SingularityError(
-        f"O2, O3 and O4 lie on a line at {_where(k, times, first)}: theta and phi are not determined there "
+        f"O2, O3 and O4 lie on a line at {_where(k, times)}: theta and phi are not determined there "
         "(type 2 singularity). Keep the motion away from it.",
         sigma=float(sigma(linkage, np.sqrt(max(X2[k], 0.0)))),
-        sample=first + k,
+        sample=k,
         time=None if times is None else float(times[k]),
     )
 
 
-def _where(k: int, times: Array | None, first: int) -> str:
-    return f"sample {first + k}" + ("" if times is None else f", t = {times[k]:.6g} s")
+def _where(k: int, times: Array | None) -> str:
+    return f"sample {k}" + ("" if times is None else f", t = {times[k]:.6g} s")

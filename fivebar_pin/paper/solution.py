@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
-from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper.kinematics import links, partials, passive_acceleration, unwrapped
 from fivebar_pin.paper.linkage import AssemblyMode, CArray, FiveBar
@@ -170,7 +170,11 @@ def _solve(
     for k in range(0, n, _BLOCK):
         s = slice(k, min(k + _BLOCK, n))
         q, v, a = (x[:, s] for x in driven)
-        b, X, out.reach2[s] = links(linkage, q[0], q[1], mode=mode, times=None if times is None else times[s], first=k)
+        try:
+            b, X, out.reach2[s] = links(linkage, q[0], q[1], mode=mode)
+        except (AssemblyError, SingularityError):
+            links(linkage, *driven[0], mode=mode, times=times)  # names the worst sample of all
+            raise
         _move(b, X, (q, v, a), out, s)
         _load(load, b, X, out, s)
     if times is not None:
