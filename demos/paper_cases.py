@@ -1,0 +1,56 @@
+"""Balance both cases of the paper's Table 1 and show them before and after, side by side.
+
+python demos/paper_cases.py             # live view in the browser
+python demos/paper_cases.py --headless  # numbers only
+"""
+
+import argparse
+
+import numpy as np
+
+import fivebar_pin as fb
+from fivebar_pin import paper, viz
+
+SPEED = 0.5  # playing speed over real time [-]
+
+
+def moved(linkage, motion, label):
+    """Take one linkage along the motion; return what the viewer shows."""
+    chain = linkage.chain()
+    start = linkage.configuration(*motion.q[0], mode=paper.AssemblyMode.LEFT)
+    trajectory = fb.drive(chain, motion, near=start)
+    return viz.Shown(chain, trajectory, fb.inverse_dynamics(chain, trajectory), label)
+
+
+def report(shown):
+    force = np.linalg.norm(shown.loads.shaking_force, axis=1)
+    travel = np.linalg.norm(shown.loads.com - shown.loads.com[0], axis=1)
+    torque, moment = np.abs(shown.loads.torque).max(axis=0), np.abs(shown.loads.shaking_moment).max()
+    print(
+        f"{shown.label:20s} shaking force {force.max():9.3e} N   moment {moment:.4f} N m   "
+        f"torques {torque[0]:.4f}, {torque[1]:.4f} N m   COM travel {1e3 * travel.max():9.3e} mm"
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--headless", action="store_true", help="do not open the browser")
+    headless = parser.parse_args().headless
+    motion = paper.default_motion(samples=201)
+    everything = []
+    for case in ("I", "II"):
+        optimum = paper.balance(paper.table_1(case, "balanced"))
+        print(f"case {case}: rho = {np.round(optimum.linkage.rho, 6)}, optimality residual {optimum.kkt_residual:.1e}")
+        for label, linkage in (
+            (f"{case} unbalanced", paper.table_1(case, "unbalanced")),
+            (f"{case} as printed", paper.table_1(case, "balanced")),
+            (f"{case} balanced", optimum.linkage),
+        ):
+            everything.append(moved(linkage, motion, label))
+            report(everything[-1])
+    if not headless:
+        viz.view(everything, speed=SPEED, title="The paper's two cases")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,5 @@
+"""`python -m fivebar_pin` is the command line."""
+
+from fivebar_pin.cli import main
+
+raise SystemExit(main())

@@ -1,0 +1,54 @@
+"""Numbers and tables for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fivebar_pin._arrays import Array
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def console() -> Console:
+    """Return the console that tables go to."""
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=False)
+
+
+def number(value: float) -> str:
+    """Write a number with four figures, round-off as what it is."""
+    return f"{value:.4g}"
+
+
+def table(console: Console, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table, first column to the left, the others to the right."""
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    for k, heading in enumerate(headings):
+        made.add_column(escape(heading), justify="right" if k else "left", no_wrap=True)
+    for row in rows:
+        made.add_row(*(escape(cell) for cell in row))
+    console.print(f"\n{title}", markup=False, soft_wrap=True)
+    console.print(made)
+
+
+def peak(x: Array) -> float:
+    """Return the largest magnitude: of vectors (n, k), of numbers (n,)."""
+    size = np.linalg.norm(x, axis=1) if x.ndim == 2 else np.abs(x)
+    return float(size.max())
+
+
+def rms(x: Array, t: Array) -> float:
+    """Return the root mean square over time (trapezoidal rule)."""
+    square = np.sum(x * x, axis=1) if x.ndim == 2 else x * x
+    if t.size == 1:
+        return float(np.sqrt(square[0]))
+    return float(np.sqrt(np.sum(0.5 * (square[1:] + square[:-1]) * np.diff(t)) / (t[-1] - t[0])))

@@ -1,0 +1,245 @@
+"""`fivebar-pin demo`: the paper's five-bar from its table to a balanced linkage moving in the browser."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fivebar_pin import motion as laws
+from fivebar_pin._arrays import Array
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.cli import _tables
+from fivebar_pin.dynamics import Loads, inverse_dynamics
+from fivebar_pin.errors import OutputError
+from fivebar_pin.kinematics import drive
+from fivebar_pin.motion import Motion
+from fivebar_pin.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fivebar_pin.paper import AssemblyMode, FiveBar, Solution
+
+FORCES = ("f01", "f12", "f23", "f34", "f40")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Run:
+    """One linkage taken along both roads."""
+
+    label: str
+    linkage: FiveBar
+    chain: ClosedChain
+    trajectory: Trajectory
+    loads: Loads
+    closed: Solution
+
+    @property
+    def travel(self) -> float:
+        """Largest distance of the mass centre from where it starts [m]."""
+        return _tables.peak(self.loads.com - self.loads.com[0])
+
+
+def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser(
+        "demo",
+        help="balance the paper's five-bar and show it before and after",
+        description="Balance the paper's five-bar; print, plot, animate and write what came out.",
+    )
+    parser.add_argument("--case", default="I", help="parameter set of Table 1, I or II [I]")
+    parser.add_argument("--mode", choices=("left", "right"), default="left", help="assembly mode [left]")
+    parser.add_argument("--motion", metavar="CSV", help="motion of psi and gamma (t, q_*, v_*, a_*)")
+    parser.add_argument("--samples", type=int, default=201, help="samples of the default motion [201]")
+    parser.add_argument("--period", type=float, default=1.0, help="period of the default motion [1.0 s]")
+    parser.add_argument("--gravity", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"))
+    parser.add_argument("--out", default="results", help="folder for everything that is written [results]")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
+    parser.add_argument("--speed", type=float, default=0.5, help="playing speed of the animation [0.5]")
+    parser.add_argument("--view", action="store_true", help="open the live view when done (Ctrl-C ends it)")
+    parser.set_defaults(run=run)
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Do the whole job."""
+    from fivebar_pin import paper, viz
+
+    folder = _prepared(Path(chosen.out), overwrite=chosen.overwrite)
+    mode = paper.AssemblyMode[chosen.mode.upper()]
+    motion = (
+        laws.from_file(chosen.motion)
+        if chosen.motion
+        else paper.default_motion(samples=chosen.samples, period=chosen.period)
+    )
+    unbalanced = paper.table_1(chosen.case, "unbalanced")
+    optimum = paper.balance(paper.table_1(chosen.case, "balanced"))
+    runs = [
+        _moved(label, linkage, motion, mode, chosen.gravity)
+        for label, linkage in (("unbalanced", unbalanced), ("balanced", optimum.linkage))
+    ]
+    console = _tables.console()
+    _print_balance(console, chosen.case, unbalanced, optimum)
+    _print_comparison(console, runs)
+    _print_checks(console, runs, optimum)
+    files = _write(folder, runs, motion, chosen)
+    console.print("Written:")
+    for file in files:
+        console.print(f"  {file}")
+    if chosen.view:
+        console.print("Opening the live view; Ctrl-C ends it.")
+        viz.view(_shown(runs), speed=chosen.speed, title=_title(chosen.case))
+    return 0
+
+
+def _prepared(folder: Path, *, overwrite: bool) -> Path:
+    """Make the folder; refuse one that holds results already."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(folder, f"cannot be written ({error.strerror or error}); choose another --out") from error
+    there = sorted(path.name for path in folder.iterdir())
+    if there and not overwrite:
+        raise OutputError(folder, f"is not empty (holds {there[0]}); choose another --out, or pass --overwrite")
+    return folder
+
+
+def _moved(label: str, linkage: FiveBar, motion: Motion, mode: AssemblyMode, gravity: Any) -> _Run:
+    from fivebar_pin import paper
+
+    closed = paper.solve(linkage, motion, mode=mode, gravity=gravity)
+    chain = linkage.chain(gravity=gravity)
+    trajectory = drive(chain, motion, near=linkage.configuration(*motion.q[0], mode=mode))
+    return _Run(label, linkage, chain, trajectory, inverse_dynamics(chain, trajectory), closed)
+
+
+def _title(case: str) -> str:
+    return f"Five-bar linkage, case {case}: unbalanced and force balanced"
+
+
+def _print_balance(console: Console, case: str, unbalanced: FiveBar, optimum: Any) -> None:
+    linkage = optimum.linkage
+    rows = [
+        (
+            f"link {i + 1}",
+            _tables.number(unbalanced.masses[i]),
+            _tables.number(unbalanced.rho[i]),
+            _tables.number(linkage.masses[i]),
+            f"{linkage.rho[i]:.9f}",
+            f"{round(linkage.alpha[i], 9) + 0.0:.9f}",
+        )
+        for i in range(4)
+    ]
+    title = f"Case {case}: mass centres that balance the shaking force (closest to mid-link, masses kept)"
+    _tables.table(console, title, ("", "before: m [kg]", "rho", "after: m [kg]", "rho", "alpha [rad]"), rows)
+
+
+def _print_comparison(console: Console, runs: list[_Run]) -> None:
+    quantities: list[tuple[str, Any]] = [
+        ("torque at psi [N m]", lambda r: r.loads.torque[:, 0]),
+        ("torque at gamma [N m]", lambda r: r.loads.torque[:, 1]),
+        ("shaking force [N]", lambda r: r.loads.shaking_force),
+        ("shaking moment at O1 [N m]", lambda r: r.loads.shaking_moment),
+        *((f"joint force {f} [N]", lambda r, k=k: r.closed.joint_forces[:, k]) for k, f in enumerate(FORCES)),
+    ]
+    rows = []
+    for name, of in quantities:
+        row = [name]
+        for r in runs:
+            values = of(r)
+            row += [_tables.number(_tables.peak(values)), _tables.number(_tables.rms(values, r.trajectory.t))]
+        rows.append(row)
+    headings = ("", "before: peak", "RMS", "after: peak", "RMS")
+    _tables.table(console, "Before and after", headings, rows)
+    rows = [
+        ["travel of the mass centre [m]", *(_tables.number(r.travel) for r in runs)],
+        ["largest residual of (60)-(69) [-]", *(_tables.number(_condition_residual(r.linkage)) for r in runs)],
+    ]
+    _tables.table(console, "Balance", ("", *(r.label for r in runs)), rows)
+
+
+def _condition_residual(linkage: FiveBar) -> float:
+    from fivebar_pin import paper
+
+    return paper.conditions(linkage).worst
+
+
+def _print_checks(console: Console, runs: list[_Run], optimum: Any) -> None:
+    rows = [
+        ["closure residual [m]", *(_tables.number(r.trajectory.worst_closure) for r in runs)],
+        ["closed form against Pinocchio, torque", *(_relative(r.closed.torque, r.loads.torque) for r in runs)],
+        [
+            "closed form against Pinocchio, moment",
+            *(_relative(r.closed.shaking_moment, r.loads.shaking_moment) for r in runs),
+        ],
+        ["motor power against rate of energy", *(_tables.number(r.loads.power_residual()) for r in runs)],
+        ["shaking wrench against rate of momentum", *(_tables.number(r.loads.momentum_residual()) for r in runs)],
+        ["optimality (KKT) residual", "", _tables.number(optimum.kkt_residual)],
+    ]
+    _tables.table(console, "Checks (relative unless a unit is given)", ("", *(r.label for r in runs)), rows)
+
+
+def _relative(x: Array, reference: Array) -> str:
+    return _tables.number(float(np.abs(x - reference).max() / np.abs(reference).max()))
+
+
+def _shown(runs: list[_Run]) -> list[Any]:
+    from fivebar_pin.viz import Shown
+
+    return [Shown(r.chain, r.trajectory, r.loads, r.label) for r in runs]
+
+
+def _write(folder: Path, runs: list[_Run], motion: Motion, chosen: argparse.Namespace) -> list[Path]:
+    from fivebar_pin import io, viz
+
+    files: list[Path] = []
+    for r in runs:
+        files += io.save(r.chain, folder, name=f"five_bar_{r.label}", formats=("urdf",), overwrite=chosen.overwrite)
+    files.append(_write_table(folder / "results.csv", runs, motion))
+    files += viz.plots.save(_figures(runs, motion), folder, overwrite=chosen.overwrite)
+    page = folder / "animation.html"
+    files.append(
+        viz.html(page, _shown(runs), speed=chosen.speed, title=_title(chosen.case), overwrite=chosen.overwrite)
+    )
+    return files
+
+
+def _figures(runs: list[_Run], motion: Motion) -> dict[str, Any]:
+    """Plots that stand for figures 5 and 6 (motion), 7, 8, 10, 11 (torques), 9 and 12 (shaking force) of the paper."""
+    from fivebar_pin.viz import plots
+
+    loads, t = {r.label: r.loads for r in runs}, motion.t
+    return {
+        "motion": plots.motion(motion, ("psi", "gamma"), title="Motion of the motors"),
+        "torques": plots.torques(loads, ("psi", "gamma"), t=t),
+        "shaking": plots.shaking(loads, t=t),
+        "joint_forces": plots.forces({r.label: r.closed.joint_forces for r in runs}, FORCES, t=t),
+        "mass_centre": plots.com(loads),
+    }
+
+
+def _write_table(file: Path, runs: list[_Run], motion: Motion) -> Path:
+    """Write every curve as one table with named columns and units."""
+    columns: list[tuple[str, Array]] = [("t [s]", motion.t)]
+    for k, name in enumerate(("psi", "gamma")):
+        columns += [(f"{name} [rad]", motion.q[:, k]), (f"d{name} [rad/s]", motion.v[:, k])]
+        columns.append((f"dd{name} [rad/s2]", motion.a[:, k]))
+    for r in runs:
+        vectors = {"F {} [N]": r.loads.shaking_force[:, :2], "com {} [m]": r.loads.com[:, :2]}
+        vectors |= {f"{f} {{}} [N]": r.closed.joint_forces[:, k] for k, f in enumerate(FORCES)}
+        columns += [
+            (f"{r.label} {x} [rad]", r.closed.angles[:, k]) for k, x in enumerate(("psi", "theta", "phi", "gamma"))
+        ]
+        columns += [(f"{r.label} tau_{x} [N m]", r.loads.torque[:, k]) for k, x in enumerate(("psi", "gamma"))]
+        columns.append((f"{r.label} M_O1 [N m]", r.loads.shaking_moment[:, 2]))
+        for name, values in vectors.items():
+            columns += [(f"{r.label} {name.format(axis)}", values[:, k]) for k, axis in enumerate("xy")]
+    header = ",".join(name for name, _ in columns)
+    np.savetxt(file, np.column_stack([x for _, x in columns]), delimiter=",", header=header, comments="", fmt="%.17g")
+    return file

@@ -1,0 +1,116 @@
+"""The command line: what it writes, what it says, and its exit codes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fivebar_pin as fb
+from fivebar_pin.cli import main
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run the main job once."""
+    folder = tmp_path_factory.mktemp("demo") / "out"
+    assert main(["demo", "--out", str(folder), "--samples", "101"]) == 0
+    return folder
+
+
+def test_demo_writes_all_it_names(results: Path) -> None:
+    """The balanced mechanism, the table, the plots and the page are there."""
+    names = {p.name for p in results.iterdir()}
+    assert {"five_bar_balanced.urdf", "five_bar_balanced.yaml", "results.csv", "animation.html"} <= names
+    assert {"motion.png", "torques.png", "shaking.png", "joint_forces.png", "mass_centre.png"} <= names
+
+
+def test_demo_results_table_is_named_and_balanced(results: Path) -> None:
+    """The table has named columns with units, and the balanced linkage does not shake in it."""
+    header = (results / "results.csv").read_text().splitlines()[0].split(",")
+    data = np.loadtxt(results / "results.csv", delimiter=",", skiprows=1)
+    assert data.shape == (101, len(header))
+    assert all("[" in name for name in header)
+    column = dict(zip(header, data.T, strict=True))
+    assert np.abs(column["unbalanced F x [N]"]).max() > 0.1
+    assert np.abs(column["balanced F x [N]"]).max() < 1e-13
+    assert np.ptp(column["balanced com y [m]"]) < 1e-15
+    f = column["unbalanced f40 x [N]"] - column["unbalanced f01 x [N]"]
+    np.testing.assert_allclose(f, column["unbalanced F x [N]"], rtol=0, atol=1e-14)
+
+
+def test_demo_balanced_file_is_a_balanced_mechanism(results: Path) -> None:
+    """What the user takes away still balances after it has been read back."""
+    chain = fb.load(results / "five_bar_balanced.urdf")
+    motion = fb.paper.default_motion(samples=31)
+    loads = fb.inverse_dynamics(chain, fb.drive(chain, motion))
+    assert np.abs(loads.shaking_force).max() < 1e-12
+    assert np.abs(loads.torque).max() > 1e-3
+
+
+def test_demo_does_not_overwrite(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder with results is refused in one line that says the way out."""
+    before = (results / "results.csv").read_bytes()
+    assert main(["demo", "--out", str(results)]) == 1
+    said = capsys.readouterr().err
+    assert "--overwrite" in said and said.count("\n") == 1
+    assert (results / "results.csv").read_bytes() == before
+
+
+def test_demo_says_which_case_exists(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An unknown case lists the known ones."""
+    assert main(["demo", "--case", "III", "--out", str(tmp_path / "x")]) == 1
+    assert "known: I, II" in capsys.readouterr().err
+
+
+def test_demo_names_a_folder_it_cannot_write(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file in the way of the output folder is an error of one line, not a traceback."""
+    (tmp_path / "file").write_text("")
+    assert main(["demo", "--out", str(tmp_path / "file" / "sub")]) == 1
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_demo_names_the_sample_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A motion out of reach names the sample and the gap."""
+    t = np.linspace(0.0, 1.0, 11)
+    fb.motion.to_file(
+        fb.motion.combine(fb.motion.constant(t, 0.0), fb.motion.cycloidal(t, 1.0, -6.0)),
+        tmp_path / "m.csv",
+        ("psi", "gamma"),
+    )
+    far = main(["demo", "--case", "II", "--motion", str(tmp_path / "m.csv"), "--out", str(tmp_path / "o")])
+    said = capsys.readouterr().err
+    assert far == 1 and "sample" in said and " m" in said
+
+
+def test_check_passes_a_shipped_mechanism_and_fails_a_broken_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 0 for a sound mechanism, 1 for one with too few motors."""
+    assert main(["check", "five_bar_case_I"]) == 0
+    chain = fb.load(fb.io.shipped_path("five_bar_case_I")).with_actuated(["psi"])
+    fb.save(chain, tmp_path, name="lame")
+    assert main(["check", str(tmp_path / "lame.urdf")]) == 1
+    assert "under-actuated" in capsys.readouterr().out.lower()
+
+
+def test_check_names_the_shipped_mechanisms_when_asked_for_an_unknown_one(capsys: pytest.CaptureFixture[str]) -> None:
+    """A bare name that is no file lists what ships."""
+    assert main(["check", "six_bar"]) == 1
+    assert "five_bar_case_I" in capsys.readouterr().err
+
+
+def test_view_writes_a_page(tmp_path: Path) -> None:
+    """Any mechanism can be written as one HTML page."""
+    page = tmp_path / "page.html"
+    assert main(["view", "four_bar_crank_rocker", "--html", str(page)]) == 0
+    assert "<html" in page.read_text(encoding="utf-8")[:200].lower()
+
+
+def test_wrong_words_exit_with_two() -> None:
+    """A wrong command line is exit code 2 with usage, from a real process."""
+    done = subprocess.run([sys.executable, "-m", "fivebar_pin", "dance"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "usage" in done.stderr
