@@ -26,7 +26,8 @@ def mass_matrix(model: pin.Model, q: Array) -> Array:
 
 def random_inertia(rng: np.random.Generator) -> pin.Inertia:
     A = rng.normal(size=(3, 3))
-    return pin.Inertia(rng.uniform(0.1, 3.0), rng.normal(size=3), A @ A.T + np.eye(3))
+    S = A @ A.T
+    return pin.Inertia(rng.uniform(0.1, 3.0), rng.normal(size=3), np.trace(S) * np.eye(3) - S)
 
 
 def random_placement(rng: np.random.Generator) -> pin.SE3:

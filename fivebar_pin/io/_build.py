@@ -14,7 +14,7 @@ from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._sidecar import DATA_FIELDS, Sidecar
 from fivebar_pin.io._tree import UNLIMITED, JointEntry, TreeEntry
 
-__all__ = ["build_model", "joint_model", "joint_order", "set_default_limits"]
+__all__ = ["bare_inertia", "build_model", "joint_model", "joint_order", "set_default_limits"]
 
 ROOT_JOINT = "root_joint"
 _AXES = {(1.0, 0.0, 0.0): 0, (0.0, 1.0, 0.0): 1, (0.0, 0.0, 1.0): 2}
@@ -189,6 +189,13 @@ def _depth_first(tree: TreeEntry, rank: dict[str, int], wanted: list[str], besid
         problem = "joint_order: must go through the tree depth first (each joint before the joints it carries, one"
         raise FileFormatError(beside, problem + " branch finished before the next begins)")
     return order
+
+
+def bare_inertia(mass: float, com: Array, tensor: Array) -> pin.Inertia:
+    """Return an inertia as stated, plausible or not: whether such a body can exist is for the diagnosis to tell."""
+    result = pin.Inertia.Zero()
+    result.mass, result.lever, result.inertia = mass, com, tensor
+    return result
 
 
 def joint_model(kind: str, axis: Array) -> object:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
@@ -185,13 +184,9 @@ def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, 
         for name in closure.frames:
             if name not in poses:
                 raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, poses)}")
-            first, *others = poses[name]
-            for other in others:
-                if other.parentJoint != first.parentJoint or not np.allclose(
-                    other.placement.homogeneous, first.placement.homogeneous, rtol=0.0, atol=1e-12
-                ):
-                    problem = f"the name {name!r} stands for several frames in different places; rename one"
-                    raise FileFormatError(file, f"{key}[{k}]: {problem}")
+            if len(poses[name]) > 1:
+                problem = f"the name {name!r} stands for {len(poses[name])} frames (links, joints); rename one"
+                raise FileFormatError(file, f"{key}[{k}]: {problem}")
         joints = [poses[name][0].parentJoint for name in closure.frames]
         if joints[0] == joints[1]:
             body = model.names[joints[0]]

@@ -10,10 +10,14 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
 
-__all__ = ["UNLIMITED", "JointEntry", "LinkEntry", "TreeEntry", "matrix_to_rpy", "rpy_to_matrix"]
+__all__ = ["UNIVERSE", "UNLIMITED", "JointEntry", "LinkEntry", "TreeEntry", "matrix_to_rpy", "rpy_to_matrix"]
 
 UNLIMITED = float(np.finfo(np.float64).max)
 """What Pinocchio writes for a limit that is none."""
+
+
+UNIVERSE = "universe"
+"""Pinocchio's name for the fixed world."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

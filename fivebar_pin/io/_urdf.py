@@ -11,13 +11,18 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
 from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.io._build import bare_inertia
 from fivebar_pin.io._files import MAX_BYTES
-from fivebar_pin.io._tree import UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
+from fivebar_pin.io._tree import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
 from fivebar_pin.io._xml import Reader, parse_xml
 
 __all__ = ["read_urdf"]
 
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+_IN_ROBOT = ("link", "joint", "material", "gazebo", "transmission")
+_IN_LINK = ("inertial", "visual", "collision", "collision_checking", "self_collision_checking", "contact")
+_IN_JOINT = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
+_TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _SHAPES = ("box", "capsule", "cylinder", "sphere", "mesh")
 _GREY = (0.6, 0.6, 0.65, 1.0)
 Colours = dict[str, tuple[float, float, float, float]]
@@ -31,6 +36,7 @@ def read_urdf(path: Path, *, max_bytes: int = MAX_BYTES) -> TreeEntry:
     """
     robot = parse_xml(path, root="robot", max_bytes=max_bytes)
     reader = Reader(path)
+    reader.no_misspelt(robot, "<robot>", tags=_IN_ROBOT)
     colours = _colours(reader, robot)
     links: dict[str, LinkEntry] = {}
     for element in robot.findall("link"):
@@ -46,6 +52,9 @@ def read_urdf(path: Path, *, max_bytes: int = MAX_BYTES) -> TreeEntry:
         joints[joint.name] = joint
     if not links:
         raise FileFormatError(path, "has no <link>")
+    for name in (*links, *joints):
+        if name == UNIVERSE:
+            raise reader.fail(f"{name!r}", "is the name of the fixed world in Pinocchio; rename the link or joint")
     root = _root(reader, links, joints)
     return TreeEntry(robot.get("name") or path.stem, root, links, joints)
 
@@ -84,6 +93,7 @@ def _root(reader: Reader, links: dict[str, LinkEntry], joints: dict[str, JointEn
 
 def _origin(reader: Reader, parent: ElementTree.Element, where: str) -> tuple[Array, Array]:
     element = reader.only(parent, "origin", where)
+    reader.known(element, ("xyz", "rpy"), where)
     xyz = reader.numbers(element, "xyz", 3, where, [0.0, 0.0, 0.0])
     rpy = reader.numbers(element, "rpy", 3, where, [0.0, 0.0, 0.0])
     return np.array(xyz), rpy_to_matrix(rpy)
@@ -98,12 +108,14 @@ def _homogeneous(xyz: Array, R: Array) -> Array:
 def _link(reader: Reader, element: ElementTree.Element, colours: Colours) -> LinkEntry:
     name = reader.text(element, "name", "a <link>")
     where = f"link {name!r}"
+    reader.no_misspelt(element, where, tags=_IN_LINK)
     inertial = reader.only(element, "inertial", where)
     visuals = tuple(_visual(reader, visual, name, colours) for visual in element.findall("visual"))
     return LinkEntry(name, None if inertial is None else _inertia(reader, inertial, where), visuals)
 
 
 def _inertia(reader: Reader, inertial: ElementTree.Element, where: str) -> pin.Inertia:
+    reader.no_misspelt(inertial, where, tags=("origin", "mass", "inertia"))
     com, R = _origin(reader, inertial, where)
     mass_element, tensor = reader.only(inertial, "mass", where), reader.only(inertial, "inertia", where)
     if mass_element is None or tensor is None:
@@ -111,20 +123,14 @@ def _inertia(reader: Reader, inertial: ElementTree.Element, where: str) -> pin.I
     (mass,) = reader.numbers(mass_element, "value", 1, where, None)
     if mass < 0.0:
         raise reader.fail(where, f"mass = {mass!r} must not be negative [kg]")
-    words = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    xx, xy, xz, yy, yz, zz = (reader.numbers(tensor, word, 1, where, None)[0] for word in words)
+    reader.known(mass_element, ("value",), where)
+    reader.known(tensor, _TENSOR, where)
+    xx, xy, xz, yy, yz, zz = (reader.numbers(tensor, word, 1, where, None)[0] for word in _TENSOR)
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if not np.array_equal(R, np.eye(3)):
         inertia = R @ inertia @ R.T
         inertia = 0.5 * (inertia + inertia.T)
-    return _pin_inertia(mass, com, inertia)
-
-
-def _pin_inertia(mass: float, com: Array, inertia: Array) -> pin.Inertia:
-    """Return the inertia as stated, plausible or not: whether a body can exist is for the diagnosis to tell."""
-    result = pin.Inertia.Zero()
-    result.mass, result.lever, result.inertia = mass, com, inertia
-    return result
+    return bare_inertia(mass, com, inertia)
 
 
 def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
@@ -133,6 +139,7 @@ def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
     kind = reader.text(element, "type", where)
     if kind not in _KINDS:
         raise reader.fail(where, str(UnknownNameError("joint type", kind, _KINDS)))
+    reader.no_misspelt(element, where, tags=_IN_JOINT)
     ends = []
     for tag in ("parent", "child"):
         end = reader.only(element, tag, where)
@@ -148,7 +155,9 @@ def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
 
 
 def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> Array:
-    axis = np.array(reader.numbers(reader.only(element, "axis", where), "xyz", 3, where, [1.0, 0.0, 0.0]))
+    stated = reader.only(element, "axis", where)
+    reader.known(stated, ("xyz",), where)
+    axis = np.array(reader.numbers(stated, "xyz", 3, where, [1.0, 0.0, 0.0]))
     if kind in ("fixed", "floating"):
         return axis
     length = float(np.linalg.norm(axis))
@@ -163,6 +172,8 @@ def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: 
     if kind not in ("revolute", "continuous", "prismatic"):
         return {}
     limit, dynamics = reader.only(element, "limit", where), reader.only(element, "dynamics", where)
+    reader.no_misspelt(limit, where, words=("lower", "upper", "effort", "velocity"))
+    reader.no_misspelt(dynamics, where, words=("damping", "friction"))
     data = {
         "damping": reader.numbers(dynamics, "damping", 1, where, [0.0]),
         "friction": reader.numbers(dynamics, "friction", 1, where, [0.0]),

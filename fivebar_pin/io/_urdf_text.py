@@ -17,7 +17,7 @@ from fivebar_pin.io._outline import joint_data, outline
 from fivebar_pin.io._sidecar import DATA_WORDS, Sidecar
 from fivebar_pin.io._tree import UNLIMITED, JointEntry, LinkEntry, TreeEntry, matrix_to_rpy
 
-__all__ = ["numbers", "urdf_and_sidecar"]
+__all__ = ["configurations", "mesh_name", "numbers", "urdf_and_sidecar"]
 
 GRAVITY = (0.0, 0.0, -9.81)
 _ONE_AXIS = ("revolute", "continuous", "prismatic")
@@ -57,7 +57,6 @@ def _sidecar(chain: ClosedChain, tree: TreeEntry) -> Sidecar:
             data[joint.name] = {word: [_finite(x) for x in values] for word, values in entries.items()}
     usual = [name for name in joint_order(tree) if tree.joints[name].kind != "fixed"]
     gravity = tuple(float(g) for g in model.gravity.linear)
-    configurations = {str(k): [float(x) for x in q] for k, q in _configurations(model)}
     return Sidecar(
         closures=chain.closures,
         actuated=chain.actuated,
@@ -65,7 +64,7 @@ def _sidecar(chain: ClosedChain, tree: TreeEntry) -> Sidecar:
         gravity=None if gravity == GRAVITY else gravity,
         joint_order=None if usual == list(chain.joints) else chain.joints,
         joint_data=data,
-        configurations=configurations,
+        configurations={name: [float(x) for x in q] for name, q in configurations(model)},
     )
 
 
@@ -185,5 +184,6 @@ def _limits(joint: JointEntry, model: pin.Model) -> list[str]:
     return lines
 
 
-def _configurations(model: pin.Model) -> list[tuple[str, Array]]:
+def configurations(model: pin.Model) -> list[tuple[str, Array]]:
+    """Return the reference configurations by name."""
     return [(str(entry.key()), np.array(entry.data())) for entry in model.referenceConfigurations]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-from fivebar_pin.errors import FileFormatError
+from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._files import MAX_BYTES, read_bounded
 
 __all__ = ["Reader", "parse_xml"]
@@ -100,6 +101,32 @@ class Reader:
         if not math.isfinite(value):
             raise self.fail(where, f"{attribute} holds {word[:40]!r}, which is out of range")
         return value
+
+    def known(self, element: ElementTree.Element | None, attributes: tuple[str, ...], where: str) -> None:
+        """Refuse attributes outside the given ones, so that no misspelt value is silently a default."""
+        if element is None:
+            return
+        for attribute in element.attrib:
+            if attribute not in attributes:
+                raise self.fail(where, str(UnknownNameError(f"attribute of <{element.tag}>", attribute, attributes)))
+
+    def no_misspelt(
+        self,
+        element: ElementTree.Element | None,
+        where: str,
+        *,
+        tags: tuple[str, ...] = (),
+        words: tuple[str, ...] = (),
+    ) -> None:
+        """Refuse children or attributes that are nearly a known one; others are extensions and are passed over."""
+        if element is None:
+            return
+        children = [str(child.tag) for child in element] if tags else []
+        for kind, found, known in (("element", children, tags), ("attribute", [*element.attrib], words)):
+            for name in found:
+                near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.75) if name not in known else []
+                if near:
+                    raise self.fail(where, f"has an unknown {kind} {name!r}; did you mean {near[0]!r}?")
 
     def only(self, element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element | None:
         """Return the only child with this tag, or None; two are an error."""

@@ -1,0 +1,255 @@
+"""MJCF: the tree of bodies, the equality section as closures, the actuators' joints as driven joints."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
+from fivebar_pin.io._build import build_model
+from fivebar_pin.io._files import MAX_BYTES
+from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
+from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
+from fivebar_pin.io._sidecar import Sidecar
+from fivebar_pin.io._xml import parse_xml
+
+__all__ = ["HINGE", "UNBOUNDED", "read_mjcf"]
+
+HINGE, UNBOUNDED = "revolute closure ", "unbounded "
+"""Names of <custom><numeric> entries: the axis of a hinge made of two connects; a hinge that turns without bounds."""
+
+_SECTIONS = (
+    "actuator", "asset", "compiler", "contact", "custom", "default", "equality", "keyframe", "option", "sensor", "size",
+    "statistic", "visual", "worldbody",
+)  # fmt: skip
+_REFUSED = {
+    "tendon": "tendons are not supported; remove the section or model them as forces",
+    "deformable": "deformable bodies are not supported",
+    "include": "included files are not read; merge them into this one",
+    "extension": "plugins are not supported",
+}
+_DRIVES = (
+    "adhesion", "cylinder", "damper", "dcmotor", "general", "intvelocity", "motor", "muscle", "plugin", "position",
+    "velocity",
+)  # fmt: skip
+_WIDTHS = {"JointModelSpherical": 4, "JointModelFreeFlyer": 7}
+
+
+def read_mjcf(
+    path: Path,
+    *,
+    closures: tuple[Closure, ...] | None = None,
+    actuated: tuple[str, ...] | None = None,
+    max_bytes: int = MAX_BYTES,
+) -> ClosedChain:
+    """Return the chain that an MJCF file describes; see `fivebar_pin.io.load`.
+
+    Coordinates are in MuJoCo's order. Read: bodies, hinge / slide / ball / free joints with their limits and losses,
+    inertias stated or from solid geoms, default classes, connect and weld, keyframes. Contacts, cameras, lights and
+    sensors are not part of a mechanism and are passed over. Whatever else acts on it is refused by name.
+    """
+    root = parse_xml(path, root="mujoco", max_bytes=max_bytes)
+    reader = MjcfReader(path, root)
+    _check_sections(reader, root)
+    bodies = BodyTree(reader, _meshes(reader, root))
+    for worldbody in root.findall("worldbody"):
+        bodies.world(worldbody)
+    if not bodies.order:
+        raise FileFormatError(path, "has no joint in its <worldbody>")
+    _unbounded(reader, root, bodies)
+    found = _Equality(reader, root, bodies).closures() if closures is None else closures
+    driven = _actuated(reader, root, bodies) if actuated is None else actuated
+    tree = bodies.tree(root.get("model") or path.stem)
+    sidecar = Sidecar(gravity=_gravity(reader, root), joint_order=tuple(bodies.order), joint_data=bodies.data)
+    model = build_model(tree, sidecar, free_flyer=False, urdf=path, beside=path)
+    _keyframes(reader, root, model)
+    visuals = tuple(v for link in tree.links.values() for v in link.visuals)
+    try:
+        return ClosedChain(model, found, driven, name=tree.name, visuals=visuals)
+    except FiveBarPinError as error:
+        if closures is not None or actuated is not None:
+            raise
+        raise FileFormatError(path, str(error)) from error
+
+
+def _check_sections(reader: MjcfReader, root: ElementTree.Element) -> None:
+    for section in root:
+        if section.tag in _REFUSED and (len(section) or section.tag == "include"):
+            raise reader.fail(f"<{section.tag}>", _REFUSED[section.tag])
+        if section.tag not in _SECTIONS and section.tag not in _REFUSED:
+            raise reader.fail("<mujoco>", str(UnknownNameError("section", section.tag, (*_SECTIONS, *_REFUSED))))
+    for element in root.iter("include"):
+        raise reader.fail(f"<{element.tag}>", _REFUSED["include"])
+    for word in ("boundmass", "boundinertia", "settotalmass", "balanceinertia", "inertiagrouprange"):
+        if reader.compiler.get(word, "0").split()[:1] not in (["0"], ["false"], ["-1"], ["0.0"]):
+            raise reader.fail("<compiler>", f"{word} is not supported; state the masses and inertias themselves")
+    if reader.compiler.get("coordinate", "local") != "local":
+        raise reader.fail("<compiler>", "global coordinates are not supported; write local ones")
+    if reader.compiler.get("inertiafromgeom", "auto") not in ("auto", "true", "false"):
+        raise reader.fail("<compiler>", "inertiafromgeom must be auto, true or false")
+    option = reader.merged(root.findall("option"))
+    for word in ("density", "viscosity", "wind"):
+        if any(reader.number(x, word, "<option>") for x in option.get(word, "").split()):
+            raise reader.fail("<option>", f"{word}: forces of a fluid are not supported; remove it")
+
+
+def _gravity(reader: MjcfReader, root: ElementTree.Element) -> tuple[float, ...]:
+    option = ElementTree.Element("option", reader.merged(root.findall("option")))
+    return tuple(reader.numbers(option, "gravity", 3, "<option>", [0.0, 0.0, -9.81]))
+
+
+def _meshes(reader: MjcfReader, root: ElementTree.Element) -> dict[str, str]:
+    folder = reader.path.parent / reader.compiler.get("meshdir", reader.compiler.get("assetdir", ""))
+    meshes = {}
+    for mesh in root.findall("asset/mesh"):
+        file = mesh.get("file", "")
+        meshes[mesh.get("name") or Path(file).stem] = str(folder / file) if file else ""
+    return meshes
+
+
+def _unbounded(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> None:
+    """Make hinges that were saved from joints of two coordinates (cosine, sine) such joints again."""
+    from dataclasses import replace
+
+    for numeric in root.findall("custom/numeric"):
+        name = numeric.get("name", "")
+        if name.startswith(UNBOUNDED):
+            joint = bodies.joints.get(name[len(UNBOUNDED) :])
+            if joint is None or joint.kind != "revolute":
+                raise reader.fail(f"custom {name!r}", "names no hinge of this file")
+            data = {word: joint.data[word] for word in ("effort", "velocity")}
+            bodies.joints[joint.name] = replace(joint, kind="continuous", data=data)
+
+
+def _actuated(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> tuple[str, ...]:
+    names: list[str] = []
+    for actuator in root.findall("actuator/*"):
+        where = f"{actuator.tag} {actuator.get('name', '')!r}"
+        if actuator.tag not in _DRIVES:
+            raise reader.fail(where, str(UnknownNameError("actuator", actuator.tag, _DRIVES)))
+        joint = actuator.get("joint") or actuator.get("jointinparent")
+        if joint is None:
+            raise reader.fail(where, "drives no joint; only actuators with joint= are supported")
+        if joint not in bodies.order:
+            raise reader.fail(where, str(UnknownNameError("joint", joint, bodies.order)))
+        if bodies.joints[joint].kind not in ("revolute", "prismatic", "continuous"):
+            raise reader.fail(where, f"drives {joint!r}, which has several degrees of freedom; a motor drives one")
+        if joint not in names:
+            names.append(joint)
+    return tuple(names)
+
+
+def _keyframes(reader: MjcfReader, root: ElementTree.Element, model: pin.Model) -> None:
+    """Keep keyframes as reference configurations, quaternions turned from (w, x, y, z) to (x, y, z, w)."""
+    size = sum(
+        {"JointModelSpherical": 4, "JointModelFreeFlyer": 7}.get(j.shortname(), 1) for j in list(model.joints)[1:]
+    )
+    for k, key in enumerate(root.findall("keyframe/key")):
+        where = f"key {key.get('name', '')!r}"
+        if "qpos" not in key.attrib:
+            continue
+        qpos = np.array(reader.numbers(key, "qpos", size, where, None))
+        model.referenceConfigurations[key.get("name") or f"key{k}"] = _from_qpos(reader, model, qpos, where)
+
+
+def _from_qpos(reader: MjcfReader, model: pin.Model, qpos: Array, where: str) -> Array:
+    parts: list[Array] = []
+    for j in range(1, model.njoints):
+        kind = model.joints[j].shortname()
+        take = _WIDTHS.get(kind, 1)
+        mine, qpos = qpos[:take], qpos[take:]
+        if take == 1:
+            parts.append(np.array([np.cos(mine[0]), np.sin(mine[0])]) if model.nqs[j] == 2 else mine)
+            continue
+        quaternion = reader.unit(mine[-4:], "qpos", where)
+        if take == 7:
+            world = pin.SE3(homogeneous(mine[:3], quaternion_matrix(quaternion)))
+            parts.append(pin.SE3ToXYZQUAT(model.jointPlacements[j].actInv(world)))
+        else:
+            parts.append(np.roll(quaternion, -1))
+    return np.concatenate(parts)
+
+
+class _Equality:
+    """Turns the equality section into closures, adding the frames that it implies."""
+
+    def __init__(self, reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> None:
+        self.reader, self.bodies = reader, bodies
+        self.elements = root.findall("equality/*")
+        self.hinges: dict[str, list[float]] = {}
+        for numeric in root.findall("custom/numeric"):
+            name = numeric.get("name", "")
+            if name.startswith(HINGE):
+                self.hinges[name[len(HINGE) :]] = reader.numbers(numeric, "data", 3, f"custom {name!r}", None)
+
+    def closures(self) -> tuple[Closure, ...]:
+        """Return one closure per connect or weld; two connects marked as a hinge give one revolute closure."""
+        closures: list[Closure] = []
+        for k, element in enumerate(self.elements):
+            name = element.get("name") or f"{element.tag}_{k}"
+            where = f"{element.tag} {name!r}"
+            if element.tag not in ("connect", "weld"):
+                what = "couples coordinates" if element.tag == "joint" else "is"
+                raise self.reader.fail(where, f"{what} not as a closure of two frames; not supported, remove it")
+            full = self.reader.with_defaults(element, None)
+            if full.get("active", "true") != "true":
+                raise self.reader.fail(where, "is not active; remove it or make it active")
+            if name.endswith(" axis") and name[: -len(" axis")] in self.hinges:
+                continue
+            kind = ClosureKind.POINT if element.tag == "connect" else ClosureKind.WELD
+            frames = self.frames(full, name, where)
+            axis = self.hinges.get(name)
+            try:
+                if axis is not None and kind is ClosureKind.POINT:
+                    if not any(e.get("name") == f"{name} axis" for e in self.elements):
+                        raise self.reader.fail(
+                            where, f"is marked as a hinge but lacks its second connect {name + ' axis'!r}"
+                        )
+                    closures.append(Closure(frames, ClosureKind.REVOLUTE, axis, name))
+                else:
+                    closures.append(Closure(frames, kind, name=name))
+            except FileFormatError:
+                raise
+            except FiveBarPinError as error:
+                raise self.reader.fail(where, str(error)) from error
+        return tuple(closures)
+
+    def frames(self, element: ElementTree.Element, name: str, where: str) -> tuple[str, str]:
+        sites = [element.get("site1"), element.get("site2")]
+        if any(sites):
+            for site in sites:
+                if site not in self.bodies.sites:
+                    raise self.reader.fail(where, str(UnknownNameError("site", site, self.bodies.sites)))
+            return self.bodies.sites[str(sites[0])], self.bodies.sites[str(sites[1])]
+        links = []
+        for word in ("body1", "body2"):
+            body = element.get(word, WORLD if word == "body2" else "")
+            if body not in self.bodies.bodies:
+                raise self.reader.fail(where, str(UnknownNameError("body", body, self.bodies.bodies)))
+            links.append(self.bodies.bodies[body])
+        if links[0] == links[1]:
+            raise self.reader.fail(where, f"joins body {links[0]!r} to itself")
+        first, second = (self.bodies.poses[link] for link in links)
+        if element.tag == "connect":
+            anchor = np.array(self.reader.numbers(element, "anchor", 3, where, None))
+            one = homogeneous(anchor, np.eye(3))
+            two = np.linalg.inv(second) @ first @ one
+        else:
+            one, two = self.weld(element, first, second, where)
+        return self.bodies.frame(f"{name}_1", links[0], one), self.bodies.frame(f"{name}_2", links[1], two)
+
+    def weld(self, element: ElementTree.Element, first: Array, second: Array, where: str) -> tuple[Array, Array]:
+        """Return the frames that a weld makes coincide: body 2 at its relpose in body 1, moved to the anchor."""
+        values = np.array(self.reader.numbers(element, "relpose", 7, where, [0.0] * 7))
+        anchor = homogeneous(np.array(self.reader.numbers(element, "anchor", 3, where, [0.0] * 3)), np.eye(3))
+        if np.any(values[3:]):
+            relative = homogeneous(values[:3], quaternion_matrix(self.reader.unit(values[3:], "relpose", where)))
+        else:
+            relative = np.linalg.inv(first) @ second
+        return relative @ anchor, anchor

@@ -1,0 +1,221 @@
+"""A chain to MJCF text: bodies at their joints, frames as sites, closures as connect and weld.
+
+A revolute closure becomes two connects, at the closure's frames and at a second point of the hinge axis; a
+<custom><numeric> entry with the axis marks the pair, so that reading gives the one revolute closure back. MJCF has no
+place for velocity limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.chain import ClosedChain, Visual
+from fivebar_pin.closures import ClosureKind
+from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.io._mjcf import HINGE, UNBOUNDED
+from fivebar_pin.io._outline import outline
+from fivebar_pin.io._tree import JointEntry, TreeEntry
+from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
+
+__all__ = ["mjcf_text"]
+
+_KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "SPHERICAL": "ball", "floating": "free"}
+_LIMITLESS = 1e300
+
+
+def mjcf_text(chain: ClosedChain, folder: Path) -> str:
+    """Return the MJCF text of a chain, with meshes named relative to `folder`.
+
+    Raises:
+        InvalidInputError: a joint kind that MJCF lacks, or a free joint that does not hang on the world.
+    """
+    return _Writer(chain, folder).text()
+
+
+class _Writer:
+    def __init__(self, chain: ClosedChain, folder: Path) -> None:
+        self.chain, self.model, self.folder = chain, chain.model, folder
+        self.tree: TreeEntry = outline(chain)
+        self.meshes: dict[str, str] = {}
+        self.below: dict[str, list[JointEntry]] = {}
+        for joint in self.tree.joints.values():
+            self.below.setdefault(joint.parent, []).append(joint)
+        self.extra_sites: dict[str, list[tuple[str, Array]]] = {}
+        self.numeric: list[str] = []
+        self.sites = {j.child for j in self.tree.joints.values() if j.kind == "fixed"}
+
+    def text(self) -> str:
+        equality = self.equality()
+        bodies = self.contents(self.tree.root, "    ")
+        motors = [f"    <motor name={quoteattr(a)} joint={quoteattr(a)}/>" for a in self.chain.actuated]
+        gravity = numbers(self.model.gravity.linear)
+        meshes = [f"    <mesh name={quoteattr(n)} file={quoteattr(f)}/>" for f, n in self.meshes.items()]
+        lines = [
+            '<?xml version="1.0" encoding="utf-8"?>',
+            f"<mujoco model={quoteattr(self.tree.name)}>",
+            '  <compiler angle="radian" autolimits="true" inertiafromgeom="false"/>',
+            f'  <option gravity="{gravity}"/>',
+            *_section("asset", meshes),
+            *_section("worldbody", bodies),
+            *_section("equality", equality),
+            *_section("actuator", motors),
+            *_section("keyframe", self.keyframes()),
+            *_section("custom", self.numeric),
+            "</mujoco>",
+            "",
+        ]
+        return "\n".join(lines)
+
+    def contents(self, link: str, indent: str) -> list[str]:
+        """Return what stands inside a body: its shapes, its sites and the bodies it carries."""
+        lines = [line for visual in self.tree.links[link].visuals for line in self.geom(visual, np.eye(4), indent)]
+        for name, M in self.extra_sites.get(link, []):
+            lines.append(f"{indent}<site name={quoteattr(name)}{_pose(M)}/>")
+        for joint in self.below.get(link, []):
+            if joint.kind == "fixed":
+                lines.append(f"{indent}<site name={quoteattr(joint.child)}{_pose(joint.placement)}/>")
+                for visual in self.tree.links[joint.child].visuals:
+                    lines += self.geom(visual, joint.placement, indent)
+        moving = [joint for joint in self.below.get(link, []) if joint.kind != "fixed"]
+        for joint in sorted(moving, key=lambda j: self.model.getJointId(j.name)):
+            lines += self.body(joint, indent)
+        return lines
+
+    def body(self, joint: JointEntry, indent: str) -> list[str]:
+        lines = [
+            f"{indent}<body name={quoteattr(joint.child)}{_pose(joint.placement)}>",
+            self.joint(joint, indent + "  "),
+        ]
+        inertia = self.tree.links[joint.child].inertia
+        if inertia is not None:
+            I = np.array(inertia.inertia)
+            full = numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]])
+            stated = f'pos="{numbers(inertia.lever)}" mass="{numbers([inertia.mass])}" fullinertia="{full}"'
+            lines.append(f"{indent}  <inertial {stated}/>")
+        return [*lines, *self.contents(joint.child, indent + "  "), f"{indent}</body>"]
+
+    def joint(self, joint: JointEntry, indent: str) -> str:
+        model, j = self.model, self.model.getJointId(joint.name)
+        kind = _KINDS.get(joint.kind)
+        if kind is None:
+            short = model.joints[j].shortname()
+            hint = "Save it as URDF only: formats=('urdf',)."
+            raise InvalidInputError(f"kind of joint {joint.name}", short, "has no word in MJCF", hint)
+        if kind == "free" and joint.parent != self.tree.root:
+            raise InvalidInputError(f"joint {joint.name}", "free", "must hang on the world in MJCF")
+        words = [f"name={quoteattr(joint.name)}", f'type="{kind}"']
+        v = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+        if kind in ("hinge", "slide"):
+            words.append(f'axis="{numbers(joint.axis)}"')
+            words += self.limits(joint, j)
+        if joint.kind == "continuous":
+            self.numeric.append(f'    <numeric name={quoteattr(UNBOUNDED + joint.name)} data="1"/>')
+        fields = {"damping": "damping", "frictionloss": "upperDryFrictionLimit", "armature": "armature"}
+        for word, field in fields.items():
+            values = np.array(getattr(model, field))[v]
+            if np.ptp(values) > 0.0:
+                raise InvalidInputError(f"{word} of joint {joint.name}", values.tolist(), "must be one number in MJCF")
+            if values[0]:
+                words.append(f'{word}="{numbers(values[:1])}"')
+        return f"{indent}<joint {' '.join(words)}/>"
+
+    def limits(self, joint: JointEntry, j: int) -> list[str]:
+        model, words = self.model, []
+        low, high = (float(x[model.idx_qs[j]]) for x in (model.lowerPositionLimit, model.upperPositionLimit))
+        if joint.kind != "continuous" and (abs(low) < _LIMITLESS or abs(high) < _LIMITLESS):
+            words.append(f'range="{numbers([low, high])}"')
+        low, high = (float(x[model.idx_vs[j]]) for x in (model.lowerEffortLimit, model.upperEffortLimit))
+        if abs(low) < _LIMITLESS and abs(high) < _LIMITLESS and (low, high) != (0.0, 0.0):
+            words.append(f'actuatorfrcrange="{numbers([low, high])}"')
+        return words
+
+    def equality(self) -> list[str]:
+        lines = []
+        for closure in self.chain.closures:
+            pair = [self.site(name) for name in closure.frames]
+            lines.append(_closure("weld" if closure.kind is ClosureKind.WELD else "connect", closure.name, pair))
+            if closure.kind is ClosureKind.REVOLUTE:
+                axis = np.asarray(closure.axis)
+                offset = np.eye(4)
+                offset[:3, 3] = axis * self.chain.length
+                ends = [self.second_site(name, offset) for name in closure.frames]
+                lines.append(_closure("connect", f"{closure.name} axis", ends))
+                self.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
+        return lines
+
+    def pose(self, frame: str) -> tuple[str, Array]:
+        """Return the link of the body that carries a frame, and the frame's pose there."""
+        f = self.model.frames[self.model.getFrameId(frame)]
+        if f.parentJoint == 0:
+            return self.tree.root, np.array(f.placement.homogeneous)
+        name = self.model.names[f.parentJoint]
+        return self.tree.joints[name].child, np.array(f.placement.homogeneous)
+
+    def site(self, frame: str) -> str:
+        if frame in self.sites:
+            return frame
+        link, M = self.pose(frame)
+        self.extra_sites.setdefault(link, []).append((frame, M))
+        self.sites.add(frame)
+        return frame
+
+    def second_site(self, frame: str, offset: Array) -> str:
+        link, M = self.pose(frame)
+        name = f"{frame} axis"
+        if name not in self.sites:
+            self.extra_sites.setdefault(link, []).append((name, M @ offset))
+            self.sites.add(name)
+        return name
+
+    def keyframes(self) -> list[str]:
+        lines = []
+        for name, q in configurations(self.model):
+            qpos = np.concatenate([self.qpos(j, q) for j in range(1, self.model.njoints)])
+            lines.append(f'    <key name={quoteattr(name)} qpos="{numbers(qpos)}"/>')
+        return lines
+
+    def qpos(self, j: int, q: Array) -> Array:
+        model = self.model
+        mine = q[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]]
+        kind = model.joints[j].shortname()
+        if kind == "JointModelFreeFlyer":
+            world = pin.SE3ToXYZQUAT(model.jointPlacements[j] * pin.XYZQUATToSE3(mine))
+            return np.concatenate([world[:3], np.roll(world[3:], 1)])
+        if kind == "JointModelSpherical":
+            return np.roll(mine, 1)
+        return np.array([np.arctan2(mine[1], mine[0])]) if mine.size == 2 else mine
+
+    def geom(self, visual: Visual, above: Array, indent: str) -> list[str]:
+        size, M = visual.size, above @ visual.placement
+        if visual.shape == "box":
+            shape = f'type="box" size="{numbers([0.5 * s for s in size])}"'
+        elif visual.shape == "sphere":
+            shape = f'type="sphere" size="{numbers(size)}"'
+        elif visual.shape == "mesh":
+            file = mesh_name(visual.mesh, self.folder)
+            shape = f'type="mesh" mesh={quoteattr(self.meshes.setdefault(file, f"mesh{len(self.meshes)}"))}'
+        else:
+            shape = f'type="{visual.shape}" size="{numbers([size[0], 0.5 * size[1]])}"'
+        rest = f'rgba="{numbers(visual.rgba)}" contype="0" conaffinity="0" mass="0"'
+        return [f"{indent}<geom {shape}{_pose(M)} {rest}/>"]
+
+
+def _section(tag: str, lines: list[str]) -> list[str]:
+    return [f"  <{tag}>", *lines, f"  </{tag}>"] if lines else []
+
+
+def _closure(tag: str, name: str, sites: list[str]) -> str:
+    return f"    <{tag} name={quoteattr(name)} site1={quoteattr(sites[0])} site2={quoteattr(sites[1])}/>"
+
+
+def _pose(M: Array) -> str:
+    text = "" if not np.any(M[:3, 3]) else f' pos="{numbers(M[:3, 3])}"'
+    if np.array_equal(M[:3, :3], np.eye(3)):
+        return text
+    x, y, z, w = pin.Quaternion(np.array(M[:3, :3])).coeffs()
+    return text + f' quat="{numbers([w, x, y, z])}"'
