@@ -104,7 +104,11 @@ class Space:
 
     def injection(self) -> Array:
         """Return U (10 nb, nb * width), T U = 1: ten parameters that carry the planar ones and nothing else."""
-        return np.asarray(self.selection().T) if self.planar else np.eye(10 * len(self.bodies))
+        return np.asarray(np.linalg.pinv(self.selection())) if self.planar else np.eye(10 * len(self.bodies))
+
+    def of(self, pi: Array) -> Array:
+        """Return the parameters of this space (nb, width) of ten per body (nb, 10)."""
+        return (self.selection() @ pi.reshape(-1)).reshape(len(self.bodies), self.width)
 
     def _body_selection(self, b: int) -> Array:
         if not self.planar:

@@ -1,0 +1,281 @@
+"""Balancing conditions of any closed chain, found numerically.
+
+Momentum is linear in the velocities and in the inertial parameters. It can be constant along all motions only if it is
+zero for every closed configuration q and every actuated velocity, so the conditions are the row space of
+
+    Y_k(q) pi = 0,     Y_k(q): momentum regressor at the velocity N(q) e_k,     k = 1 .. na,
+
+over samples q of the constraint manifold. Lengths are divided by the chain's length and masses drop out, so no rank
+depends on the units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, checked, frozen, skew
+from fivebar_pin._loops import loops_of
+from fivebar_pin.balancing._parameters import Space, plane_axes
+from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
+from fivebar_pin.balancing.regressors import State
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
+
+__all__ = ["KINDS", "BalanceConditions", "balance_conditions"]
+
+KINDS = ("force", "moment", "dynamic", "static")
+_SMALL = 1e-6  # a singular value this far below the largest may be counted as zero [-]
+_CLEAR = 1e3  # ratio of neighbouring singular values that counts as a clear decision [-]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BalanceConditions:
+    """Linear conditions on the inertial parameters under which a chain is balanced.
+
+    Attributes:
+        chain: the mechanism.
+        kind: "force", "moment", "dynamic" or "static".
+        space: the parameters the conditions are written in (four per body when planar, else ten).
+        rank: number of independent conditions.
+        basis: orthonormal rows (rank, nb * width) on the scaled parameters, see `Space.scale`.
+        matrix: the same rows on the stacked ten parameters of all bodies (rank, 10 nb), in kg.
+        reduced: reduced row echelon form on the parameters in SI units (rank, nb * width).
+        singular_values: of the stacked regressor, scaled, relative to the largest.
+        gap: ratio of the last singular value that counts to the first that does not.
+        samples: number of configurations used.
+    """
+
+    chain: ClosedChain
+    kind: str
+    space: Space
+    rank: int
+    basis: Array
+    matrix: Array
+    reduced: Array
+    singular_values: Array
+    gap: float
+    samples: int
+
+    def __repr__(self) -> str:
+        where = "planar" if self.space.planar else "spatial"
+        return (
+            f"BalanceConditions({self.chain.name!r}, {self.kind}: rank {self.rank} of {self.basis.shape[1]} {where} "
+            f"parameters, gap {self.gap:.1e})"
+        )
+
+    def __str__(self) -> str:
+        return "\n".join([repr(self), *(f"  {equation}" for equation in self.equations)])
+
+    @property
+    def freedom(self) -> int:
+        """Number of parameters that stay free."""
+        return int(self.basis.shape[1]) - self.rank
+
+    @property
+    def equations(self) -> tuple[str, ...]:
+        """The reduced form in words, SI units: which link's mass, first moments and inertia enter with what factor."""
+        names = self.space.names
+        return tuple(_equation(row, names) for row in self.reduced)
+
+    def residual(self, chain: ClosedChain | npt.ArrayLike | None = None) -> Array:
+        """Return the rows at a chain, or at parameters (nb, 10): zero when balanced (rank,) [kg].
+
+        First moments count as masses at the chain's length, inertias as masses at its square.
+        """
+        if chain is None or isinstance(chain, ClosedChain):
+            pi = (self.chain if chain is None else chain).inertial_parameters
+        else:
+            pi = checked("parameters", chain, (None, 10))
+        if pi.size != self.matrix.shape[1]:
+            raise InvalidInputError("parameters", pi.shape, f"must belong to {len(self.space.bodies)} bodies")
+        return np.asarray(self.matrix @ pi.reshape(-1))
+
+    def angles(self, equations: npt.ArrayLike) -> Array:
+        """Return the principal angles [rad] between these conditions and other equations on the same parameters.
+
+        Args:
+            equations: rows (k, nb * width) on `space.names`, SI units.
+        """
+        from scipy.linalg import subspace_angles
+
+        rows = checked("equations", equations, (None, self.basis.shape[1])) * self.space.scale
+        return np.asarray(subspace_angles(self.basis.T, rows.T))
+
+
+def balance_conditions(
+    chain: ClosedChain,
+    kind: str,
+    *,
+    gravity: npt.ArrayLike | Literal["any", "model"] = "any",
+    about: npt.ArrayLike = (0.0, 0.0, 0.0),
+    near: npt.ArrayLike | None = None,
+    space: SpaceName = "auto",
+    samples: int | None = None,
+    seed: int = 0,
+) -> BalanceConditions:
+    """Find the conditions under which a closed chain is balanced.
+
+    Args:
+        chain: the mechanism; its present masses play no part.
+        kind: "force" (centre of mass stationary), "moment" (angular momentum about `about` constant), "dynamic"
+            (both) or "static" (no gravity torque at the actuated joints).
+        gravity: for "static": "any" direction, the model's own, or a vector (3,).
+        about: point (3,) of the angular momentum; plays no part when the force is balanced too.
+        near: closed configuration (nq,): balance only the branch that it can reach. By default the conditions hold on
+            every assembly mode; they differ only for special lengths (parallelograms and the like).
+        space: "planar" (four parameters per body, in-plane force and moment), "spatial" (ten), or "auto".
+        samples: number of configurations; from the number of bodies unless given.
+        seed: of the samples.
+
+    Raises:
+        UnknownNameError: a kind that does not exist.
+        AssemblyError: too few configurations close.
+        SolverError: the singular values show no clear gap.
+    """
+    if kind not in KINDS:
+        raise UnknownNameError("kind of balance", kind, KINDS)
+    count = max(200, 20 * len(chain.joints)) if samples is None else samples
+    if not isinstance(count, (int, np.integer)) or count < 10:
+        raise InvalidInputError("samples", samples, "must be an integer of at least 10")
+    point = checked("about", about, (3,))
+    drawn = random_samples(chain, int(count), near=near, seed=seed)
+    found = space_of(chain, drawn, space)
+    rows = _rows(chain, drawn, found, kind, _direction(chain, gravity) if kind == "static" else None, point)
+    return _decide(chain, kind, found, rows, len(drawn))
+
+
+def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Array) -> tuple[Array, Array]:
+    """Return scaled momentum regressors: linear (k, 2 or 3, P) and angular (k, 1 or 3, P) for k = na n velocities."""
+    loops = loops_of(chain)
+    to_space = space.injection() * space.scale
+    linear, angular = [], []
+    for k in range(chain.na):
+        v = samples.N[:, :, k]
+        unit = np.abs(v / loops.column_scale).max(axis=1, keepdims=True)
+        Y = State.of(loops, samples.q, v / unit, poses=samples.poses).momentum()
+        Y = np.swapaxes(Y, 1, 2).reshape(len(samples), 6, -1)
+        moment = Y[:, 3:] - np.matmul(skew(about), Y[:, :3])
+        force = Y[:, :3] / space.length
+        moment = moment / space.length**2
+        if space.normal is not None:
+            axes = plane_axes(space.normal)
+            force, moment = np.matmul(axes[:2], force), np.matmul(axes[2:], moment)
+        linear.append(force @ to_space)
+        angular.append(moment @ to_space)
+    return np.concatenate(linear), np.concatenate(angular)
+
+
+def _direction(chain: ClosedChain, gravity: npt.ArrayLike | str) -> Array | None:
+    """Return the unit direction of gravity, or None for any."""
+    if isinstance(gravity, str):
+        if gravity == "any":
+            return None
+        if gravity != "model":
+            raise UnknownNameError("gravity", gravity, ("any", "model", "a vector of three"))
+        gravity = np.array(chain.model.gravity.linear)
+    g = checked("gravity", gravity, (3,))
+    size = float(np.linalg.norm(g))
+    if size == 0.0:
+        raise InvalidInputError("gravity", g.tolist(), "must not be zero for static balance")
+    return np.asarray(g / size)
+
+
+def _rows(chain: ClosedChain, samples: Samples, space: Space, kind: str, gravity: Array | None, about: Array) -> Array:
+    """Stack the scaled rows that must vanish, (rows, P)."""
+    linear, angular = momentum_rows(chain, samples, space, about)
+    if kind == "static" and gravity is not None:  # N^T g(q) = -g . (linear momentum at N e_k)
+        axes = np.eye(3) if space.normal is None else plane_axes(space.normal)[:2]
+        linear = np.matmul(axes @ gravity, linear)[:, None]
+    parts = {"force": [linear], "static": [linear], "moment": [angular], "dynamic": [linear, angular]}[kind]
+    return np.concatenate([p.reshape(-1, p.shape[-1]) for p in parts])
+
+
+def _decide(chain: ClosedChain, kind: str, space: Space, rows: Array, samples: int) -> BalanceConditions:
+    R = np.linalg.qr(rows, mode="r") if rows.shape[0] > rows.shape[1] else rows
+    _, s, Vt = np.linalg.svd(R)
+    rank, gap = _gap(s)
+    relative = s / s[0] if s.size and s[0] > 0.0 else s
+    if rank and gap < _CLEAR:
+        raise SolverError(
+            f"the singular values of the {kind} conditions of {chain.name} show no clear gap (best ratio {gap:.3g} "
+            f"after {rank}, must reach {_CLEAR:g}). Use more samples, or a range of motion away from singularities.",
+            residual=gap,
+            tolerance=_CLEAR,
+        )
+    basis = Vt[:rank]
+    return BalanceConditions(
+        chain=chain,
+        kind=kind,
+        space=space,
+        rank=rank,
+        basis=frozen(basis),
+        matrix=frozen((basis / space.scale) @ space.selection()),
+        reduced=frozen(_reduced(basis, space)),
+        singular_values=frozen(relative),
+        gap=gap,
+        samples=samples,
+    )
+
+
+def _gap(s: Array) -> tuple[int, float]:
+    """Return the rank at the widest gap below the allowed size, and the gap."""
+    if not s.size or s[0] < 1e-12:
+        return 0, float("inf")
+    floor = np.maximum(s / s[0], 1e-17)
+    extended = np.append(floor, 1e-17)  # a full rank is a gap to zero
+    ratio = extended[:-1] / extended[1:]
+    allowed = extended[1:] < _SMALL
+    if floor[-1] > _SMALL:
+        return int(s.size), float("inf")
+    ratio = np.where(allowed[: ratio.size], ratio, 0.0)
+    rank = int(np.argmax(ratio)) + 1
+    return rank, float(ratio[rank - 1])
+
+
+def _reduced(basis: Array, space: Space) -> Array:
+    """Return the reduced row echelon form in SI units; inertias and first moments of the later bodies lead."""
+    rank, P = basis.shape
+    orders = np.tile(space.orders, len(space.bodies))
+    preference = sorted(range(P), key=lambda k: (-orders[k], -(k // space.width), k))
+    pivots: list[int] = []
+    chosen = np.zeros((rank, 0))
+    for k in preference:
+        column = basis[:, k]
+        left = column - chosen @ (chosen.T @ column)
+        if np.linalg.norm(left) > 1e-6:
+            pivots.append(k)
+            left -= chosen @ (chosen.T @ left)
+            chosen = np.column_stack([chosen, left / np.linalg.norm(left)])
+        if len(pivots) == rank:
+            break
+    if not rank:
+        return np.zeros((0, P))
+    C = np.linalg.solve(basis[:, pivots], basis) / space.scale
+    C = C / C[np.arange(rank), pivots][:, None]
+    for row in C:
+        noise = 1e-9 * np.abs(row * space.scale).max()
+        for k in range(P):
+            row[k] = 0.0 if abs(row[k] * space.scale[k]) < noise else _tidy(float(row[k]))
+    order = np.argsort(pivots)
+    return np.asarray(C[order])
+
+
+def _tidy(x: float) -> float:
+    """Return the simple fraction that x stands for, if there is one."""
+    simple = float(Fraction(x).limit_denominator(1000))
+    return simple if abs(simple - x) < 1e-9 * max(abs(x), 1e-3) else x
+
+
+def _equation(row: Array, names: Sequence[str]) -> str:
+    terms: list[str] = []
+    for k in sorted((int(i) for i in np.flatnonzero(row)), key=lambda k: (row[k] != 1.0, k)):
+        factor = f"{abs(row[k]):.10g} " if abs(row[k]) != 1.0 else ""
+        sign = ("-" if row[k] < 0 else "") if not terms else (" - " if row[k] < 0 else " + ")
+        terms.append(f"{sign}{factor}{names[k]}")
+    return "".join(terms) + " = 0"
