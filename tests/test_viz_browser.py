@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import struct
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -198,6 +200,30 @@ def test_still_pose_has_no_player(browser: Window, pair: list[viz.Shown], tmp_pa
     assert not browser.page.is_visible("#player")
     a, b = (browser.world(f"/mechanisms/still/{end}") for end in ("link2/closure O3 1", "link3/closure O3 2"))
     assert a == pytest.approx(b, abs=1e-5)
+    assert browser.errors == []
+
+
+def test_shapes_of_all_kinds_are_drawn(browser: Window, pair: list[viz.Shown], tmp_path: Path) -> None:
+    """Meshes and every shape a chain may carry reach the page, in their colours and at their places."""
+    corners = struct.pack("<9f", 0, 0, 0, 0.02, 0, 0, 0, 0.02, 0)
+    (tmp_path / "a.stl").write_bytes(bytes(80) + struct.pack("<I3f", 1, 0, 0, 1) + corners + bytes(2))
+    (tmp_path / "b.obj").write_text("v 0 0 0\nv 0.02 0 0\nv 0 0.02 0\nf 1 2 3\n")
+    placement = np.eye(4)
+    placement[:3, 3] = (0.01, 0.02, 0.0)
+    sizes = {"box": (0.01, 0.02, 0.01), "cylinder": (0.01, 0.02), "capsule": (0.01, 0.02), "sphere": (0.01,)}
+    visuals = [fb.Visual("link1", shape, size, placement, (1, 0, 0, 1)) for shape, size in sizes.items()]
+    visuals += [fb.Visual("link4", "mesh", (1, 1, 1), placement, mesh=str(tmp_path / f)) for f in ("a.stl", "b.obj")]
+    chain = replace(pair[0].chain, visuals=tuple(visuals))
+    browser.open(viz.html(tmp_path / "shapes.html", [viz.Shown.at(chain, pair[0].trajectory.q[0], label="s")]).as_uri())
+    for number, body in enumerate(("link1",) * 4 + ("link4",) * 2):
+        node = f"/mechanisms/s/{body}/visual {number}/shape"
+        drawn = browser.line(node + ("/shaft" if visuals[number].shape == "capsule" else ""))
+        assert np.ptp(np.array(drawn), axis=0).max() == pytest.approx(0.02, rel=1e-3)
+        assert browser.place(node + ("/shaft" if visuals[number].shape == "capsule" else "")) == pytest.approx(
+            [0.01, 0.02, 0.0]
+        )
+    assert {"/mechanisms/s/link2/link/0", "/mechanisms/s/link3/link/0"} <= set(browser.nodes())
+    assert "/mechanisms/s/link1/link" not in browser.nodes()
     assert browser.errors == []
 
 

@@ -98,13 +98,29 @@ def body_names(chain: ClosedChain) -> tuple[str, ...]:
 
 
 def reach(chain: ClosedChain, poses: Poses) -> Array:
-    """Return the points (k, 3) [m] that the mechanism passes through: joints, ends of the bodies, mass centres."""
+    """Return points (k, 3) [m] that the mechanism passes: joints, ends of bodies, corners of shapes, mass centres."""
     points = [poses.joints[:, j, :3, 3] for j in range(1, chain.model.njoints) if chain.model.parents[j] == 0]
     for j in range(1, chain.model.njoints):
-        local = [*body_points(chain, j), np.array(chain.model.inertias[j].lever)]
+        local = [*body_points(chain, j), np.array(chain.model.inertias[j].lever), *_visual_corners(chain, j)]
         R, p = poses.joints[:, j, :3, :3], poses.joints[:, j, :3, 3]
         points += [R @ x + p for x in local]
     return np.concatenate([*points, poses.com] if points else [np.zeros((1, 3)), poses.com])
+
+
+def _visual_corners(chain: ClosedChain, joint: int) -> Array:
+    """Return the corners (k, 3) [m] of the boxes around the shapes of a body, in its frame; meshes are left out."""
+    model, corners = chain.model, [np.empty((0, 3))]
+    signs = np.array([[x, y, z, 0.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    for visual in chain.visuals:
+        frame = model.frames[model.getFrameId(visual.frame)]
+        if frame.parentJoint != joint or visual.shape == "mesh":
+            continue
+        r = visual.size[0]
+        tall = 0.5 * visual.size[-1] + (r if visual.shape == "capsule" else 0.0)
+        half = {"box": 0.5 * np.array(visual.size), "sphere": np.full(3, r)}.get(visual.shape, np.array([r, r, tall]))
+        points = signs * [*half, 0.0] + [0.0, 0.0, 0.0, 1.0]
+        corners.append((points @ visual.placement.T @ frame.placement.homogeneous.T)[:, :3])
+    return np.concatenate(corners)
 
 
 def draw_mechanism(recorder: Recorder, path: str, drawing: Drawing) -> None:
