@@ -1,0 +1,109 @@
+"""Where the energy of a motion goes: stored, supplied by motors and from outside, lost in dampers and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin import _bodies
+from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._springs import JointSpring, Spring
+from fivebar_pin._system import System, checked_wrench
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnergyBalance:
+    """Energies [J] and powers [W] along a trajectory, n samples.
+
+    Attributes:
+        kinetic: of the bodies, and of the rotors where joints have an armature (n,).
+        potential: of gravity, zero at the world origin (n,).
+        elastic: stored in springs (n,).
+        kinetic_rate: of the kinetic energy, from the accelerations (n,).
+        stored_rate: of potential and elastic energy together (n,).
+        supplied: by the motors and the forces from outside (n,).
+        dissipated: by joint damping, dry friction and the springs' dampers (n,).
+    """
+
+    kinetic: Array
+    potential: Array
+    elastic: Array
+    kinetic_rate: Array
+    stored_rate: Array
+    supplied: Array
+    dissipated: Array
+
+    @property
+    def total(self) -> Array:
+        """Kinetic, potential and elastic energy together (n,) [J]."""
+        return np.asarray(self.kinetic + self.potential + self.elastic)
+
+    def drift(self) -> float:
+        """Return the largest change of the total energy since the first sample, relative to the energy in play [-].
+
+        The energy in play is the largest kinetic energy plus the range of the stored energy. Zero in exact arithmetic
+        when nothing is supplied or dissipated.
+        """
+        stored = self.potential + self.elastic
+        scale = float(self.kinetic.max() + np.ptp(stored))
+        return float(np.abs(self.total - self.total[0]).max()) / max(scale, 1e-300)
+
+    def residual(self) -> float:
+        """Return the largest mismatch of the rates: kinetic + stored = supplied - dissipated, relative [-]."""
+        mismatch = np.abs(self.kinetic_rate + self.stored_rate - self.supplied + self.dissipated)
+        scale = sum(np.abs(x) for x in (self.kinetic_rate, self.stored_rate, self.supplied, self.dissipated))
+        return float(mismatch.max() / max(float(scale.max()), 1e-300))
+
+
+def energy_balance(
+    chain: ClosedChain,
+    trajectory: Trajectory,
+    *,
+    torque: npt.ArrayLike | None = None,
+    springs: Iterable[Spring | JointSpring] = (),
+    external: Mapping[str, npt.ArrayLike] | None = None,
+) -> EnergyBalance:
+    """Account for the energy along a trajectory, body by body.
+
+    Args:
+        chain: the mechanism.
+        trajectory: of this chain.
+        torque: of the actuated joints (na,) or (n, na), as it was applied [N m or N]; None for none.
+        springs: as they were simulated.
+        external: wrenches (6,) or (n, 6) by frame, as they were applied.
+
+    Returns:
+        Energies, their rate, and the powers supplied and dissipated.
+    """
+    system, n, v = System.of(chain, tuple(springs)), len(trajectory), trajectory.v
+    given = np.zeros(chain.na) if torque is None else np.asarray(torque, dtype=np.float64)
+    tau = checked(
+        "torque", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na)
+    )
+    point = system.manifold.at(np.asarray(trajectory.q))
+    tree = system.manifold.loops.tree
+    bodies = _bodies.Bodies.of(chain)
+    moving = _bodies.body_rates(tree, bodies, point.poses, tree.rates(trajectory.q, v, point.poses), trajectory.a)
+    gravity = np.array(chain.model.gravity.linear)
+    weight = _bodies.gravity_wrenches(bodies, moving.centre, gravity)
+    armature = np.array(chain.model.armature)
+    sprung = system.spring_forces(point, v)
+    applied = system.wrench_forces(point, checked_wrench(chain, external, n))
+    damped = np.sum(system.damping * v * v + system.friction * np.abs(v), axis=1)
+    rotors = armature * v
+    return EnergyBalance(
+        kinetic=frozen(0.5 * np.sum(moving.twist * moving.momentum, axis=(1, 2)) + 0.5 * np.sum(rotors * v, axis=1)),
+        potential=frozen(-np.einsum("nbi,i,b->n", moving.centre, gravity, bodies.mass)),
+        elastic=frozen(sprung.energy),
+        kinetic_rate=frozen(np.sum(moving.rate * moving.twist, axis=(1, 2)) + np.sum(rotors * trajectory.a, axis=1)),
+        stored_rate=frozen(
+            -np.sum(weight * moving.twist, axis=(1, 2)) - np.sum(sprung.force * v, axis=1) - sprung.dissipation
+        ),
+        supplied=frozen(np.sum(tau * v[:, chain.actuated_index], axis=1) + np.sum(applied * v, axis=1)),
+        dissipated=frozen(damped + sprung.dissipation),
+    )

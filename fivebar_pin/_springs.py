@@ -1,0 +1,176 @@
+"""Springs and dampers, between frames or on joints: their generalised forces and their energy over a batch.
+
+between frames    F = k (|d| - l) + c d|d|/dt   along d = p_2 - p_1, pulling the frames together when positive
+on a joint        tau = -k (q - rest) - b dq/dt
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fivebar_pin._arrays import Array, checked, cross
+from fivebar_pin._loops import Loops
+from fivebar_pin._tree import Poses
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
+
+__all__ = ["JointSpring", "Spring"]
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """A spring with a damper beside it, between the origins of two frames.
+
+    Attributes:
+        frame1, frame2: names of frames of the model; one may be fixed to the ground (`universe`).
+        stiffness: k [N/m].
+        length: free length l [m].
+        damping: c, of the change of length [N s/m].
+    """
+
+    frame1: str
+    frame2: str
+    stiffness: float
+    length: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_numbers(f"spring {self.frame1}~{self.frame2}", self.stiffness, self.length, self.damping)
+        if self.length < 0.0:
+            raise InvalidInputError(f"length of spring {self.frame1}~{self.frame2}", self.length, "must be >= 0 [m]")
+        if self.frame1 == self.frame2:
+            raise InvalidInputError("spring frames", (self.frame1, self.frame2), "must differ")
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpring:
+    """A spring with a damper beside it, on a joint of one degree of freedom.
+
+    Attributes:
+        joint: name of the joint. On a continuous joint the deflection is taken within half a turn.
+        stiffness: k [N m/rad or N/m].
+        rest: coordinate at which it is relaxed [rad or m].
+        damping: b [N m s/rad or N s/m].
+    """
+
+    joint: str
+    stiffness: float
+    rest: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_numbers(f"spring on {self.joint}", self.stiffness, self.rest, self.damping)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpringForces:
+    """What springs do at a batch of states.
+
+    Attributes:
+        force: generalised force on the tree (n, nv) [N m or N].
+        energy: stored (n,) [J].
+        dissipation: power the dampers take (n,) [W].
+    """
+
+    force: Array
+    energy: Array
+    dissipation: Array
+
+
+def checked_springs(chain: ClosedChain, springs: Iterable[Spring | JointSpring]) -> tuple[Spring | JointSpring, ...]:
+    """Return the springs as a tuple once every frame and joint is known to the chain."""
+    frames = [f.name for f in chain.model.frames]
+    springs = tuple(springs)
+    for spring in springs:
+        if isinstance(spring, JointSpring):
+            if spring.joint not in chain.joints:
+                raise UnknownNameError("joint of a spring", spring.joint, chain.joints)
+            nv = chain.model.joints[chain.model.getJointId(spring.joint)].nv
+            if nv != 1:
+                raise InvalidInputError(f"spring on joint {spring.joint}", f"nv = {nv}", "needs one degree of freedom")
+        elif isinstance(spring, Spring):
+            for frame in (spring.frame1, spring.frame2):
+                if frame not in frames:
+                    raise UnknownNameError("frame of a spring", frame, frames)
+        else:
+            raise InvalidInputError("springs", spring, "must hold Spring and JointSpring objects")
+    return springs
+
+
+def spring_forces(
+    chain: ClosedChain,
+    loops: Loops,
+    springs: Iterable[Spring | JointSpring],
+    q: Array,
+    v: Array,
+    poses: Poses,
+) -> SpringForces:
+    """Evaluate all springs at states q (n, nq), v (n, nv)."""
+    total = SpringForces(np.zeros_like(v), np.zeros(v.shape[0]), np.zeros(v.shape[0]))
+    for spring in springs:
+        one = (
+            _on_joint(chain, loops, spring, q, v)
+            if isinstance(spring, JointSpring)
+            else _between(chain, loops, spring, v, poses)
+        )
+        total = SpringForces(total.force + one.force, total.energy + one.energy, total.dissipation + one.dissipation)
+    return total
+
+
+def frame_points(chain: ClosedChain, loops: Loops, frame: str, poses: Poses) -> tuple[Array, Array]:
+    """Return a frame's world origin (n, 3) and the Jacobian of its twist at the world origin (n, 6, nv)."""
+    found = chain.model.frames[chain.model.getFrameId(frame)]
+    j = int(found.parentJoint)
+    point = poses.p[j] + np.matmul(poses.R[j], np.array(found.placement.translation))
+    return point, poses.S * loops.tree.support[j]
+
+
+def wrench_force(point: Array, J: Array, wrench: Array) -> Array:
+    """Return the generalised force (n, nv) of a wrench (n, 6) at a point (n, 3); J as from `frame_points`."""
+    moment = wrench[:, 3:] + cross(point, wrench[:, :3])
+    return np.asarray(np.einsum("nik,ni->nk", J[:, :3], wrench[:, :3]) + np.einsum("nik,ni->nk", J[:, 3:], moment))
+
+
+def _on_joint(chain: ClosedChain, loops: Loops, spring: JointSpring, q: Array, v: Array) -> SpringForces:
+    joint = chain.model.joints[chain.model.getJointId(spring.joint)]
+    k = int(joint.idx_v)
+    deflection = loops.tree.coordinate(q, k) - spring.rest
+    if joint.nq == 2:
+        deflection = np.remainder(deflection + np.pi, 2.0 * np.pi) - np.pi
+    force = np.zeros_like(v)
+    force[:, k] = -spring.stiffness * deflection - spring.damping * v[:, k]
+    return SpringForces(force, 0.5 * spring.stiffness * deflection**2, spring.damping * v[:, k] ** 2)
+
+
+def _between(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Poses) -> SpringForces:
+    (p1, J1), (p2, J2) = (frame_points(chain, loops, f, poses) for f in (spring.frame1, spring.frame2))
+    d = p2 - p1
+    size = np.linalg.norm(d, axis=1)
+    stretch = size - spring.length
+    free = spring.length == 0.0 and spring.damping == 0.0  # then the force is k d, without a direction to define
+    if not free and np.any(size < 1e-12 * chain.length):
+        raise SolverError(
+            f"spring {spring.frame1}~{spring.frame2} has its ends on one point: the direction of its force is not "
+            "defined there. Give it other frames, or a free length of zero and no damping."
+        )
+    u = d / np.maximum(size, 1e-300)[:, None]
+    # rate of |d|, as a row over v: u . (v_2 - v_1)
+    row = np.einsum("ni,nik->nk", u, _point(p2, J2) - _point(p1, J1))
+    rate = np.einsum("nk,nk->n", row, v)
+    pull = spring.stiffness * stretch + spring.damping * rate
+    return SpringForces(-pull[:, None] * row, 0.5 * spring.stiffness * stretch**2, spring.damping * rate**2)
+
+
+def _point(p: Array, J: Array) -> Array:
+    """Return the Jacobian of the velocity of a point (n, 3, nv)."""
+    return np.asarray(J[:, :3] - np.swapaxes(cross(p[:, None, :], np.swapaxes(J[:, 3:], 1, 2)), 1, 2))
+
+
+def _check_numbers(name: str, stiffness: float, length: float, damping: float) -> None:
+    for what, value in (("stiffness", stiffness), ("rest", length), ("damping", damping)):
+        checked(f"{what} of {name}", value, ())
+        if what != "rest" and value < 0.0:
+            raise InvalidInputError(f"{what} of {name}", value, "must be >= 0")
