@@ -14,6 +14,7 @@ from browser import Window, chromium
 
 import fivebar_pin as fb
 from fivebar_pin import paper, viz
+from fivebar_pin.viz._drawing import COLOURS
 
 pytestmark = pytest.mark.browser
 
@@ -163,7 +164,7 @@ def test_picture_shows_the_colours_of_the_links(window: Window, pair: list[viz.S
     hsv = rgb_to_hsv(np.asarray(picture) / 255.0)
     strong = hsv[hsv[..., 1] > 0.4]
     colours = {v.frame: v.rgba[:3] for v in pair[0].chain.visuals if v.shape == "capsule"}
-    colours |= {"com": viz._mechanism.COLOURS["com"][:3], "closure": viz._mechanism.COLOURS["closure"][:3]}
+    colours |= {"com": COLOURS["com"][:3], "closure": COLOURS["closure"][:3]}
     for name, rgb in colours.items():
         hue = rgb_to_hsv(np.array(rgb))[0]
         distance = np.abs((strong[:, 0] - hue + 0.5) % 1.0 - 0.5)

@@ -7,14 +7,17 @@ import json
 import string
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.viz._mechanism import COLOURS, LINK_COLOURS, Drawing, body_names
+from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, body_names, ground_closures
 from fivebar_pin.viz._record import Colour, Recorder
 from fivebar_pin.viz._stage import Stage
+
+if TYPE_CHECKING:
+    from fivebar_pin.chain import ClosedChain
 
 __all__ = ["describe", "render"]
 
@@ -80,13 +83,21 @@ def _legend(drawings: Sequence[Drawing]) -> list[dict[str, str]]:
         entries.append(_entry("", COLOURS["joint"], f"and {len(links) - _MOST_LINKS} more links"))
     if any(d.chain.closures for d in drawings):
         entries.append(_entry("ring", COLOURS["closure"], "loop closure"))
-    entries.append(_entry("block", COLOURS["ground"], "ground"))
+    if any(_stands(d.chain) for d in drawings):
+        entries.append(_entry("block", COLOURS["ground"], "ground"))
     entries.append(_entry("rim", COLOURS["body com"], "mass centre of a link"))
     if any(len(d.poses.com) for d in drawings):
         entries.append(_entry("trace", COLOURS["com"], "total mass centre and its path"))
     if any(d.force is not None for d in drawings):
         entries.append(_entry("arrow", COLOURS["force"], "shaking force on the frame"))
     return entries
+
+
+def _stands(chain: ClosedChain) -> bool:
+    """Return whether anything but a free-flying base joins the mechanism to the ground."""
+    model = chain.model
+    held = any(model.parents[j] == 0 and model.nvs[j] < 6 for j in range(1, model.njoints))
+    return held or bool(ground_closures(chain))
 
 
 def _link_entries(drawing: Drawing) -> list[tuple[str, Colour]]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.viz._drawing import Drawing, amid_ground, reach
 from fivebar_pin.viz._geometry import View
-from fivebar_pin.viz._mechanism import Drawing, amid_ground, reach
 from fivebar_pin.viz._record import Colour, Recorder
 
 __all__ = ["MECHANISMS", "Stage"]

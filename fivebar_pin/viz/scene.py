@@ -14,8 +14,9 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin.errors import InvalidInputError, OutputError
 from fivebar_pin.trajectory import Trajectory
+from fivebar_pin.viz._drawing import Drawing, reach, safe
 from fivebar_pin.viz._geometry import View, compute_poses, find_view
-from fivebar_pin.viz._mechanism import Drawing, draw_mechanism, reach, safe
+from fivebar_pin.viz._mechanism import draw_mechanism
 from fivebar_pin.viz._page import describe, render
 from fivebar_pin.viz._record import Recorder, pose
 from fivebar_pin.viz._stage import MECHANISMS, Stage
