@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -167,16 +167,20 @@ def from_file(path: str | Path) -> Motion:
     """
     file = Path(path)
     try:
-        table: Any = np.genfromtxt(file, delimiter=",", names=True, dtype=np.float64, deletechars="", encoding="utf-8")
-    except (OSError, UnicodeDecodeError, ValueError, IndexError, StopIteration) as error:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            lines = [line for line in csv.reader(stream) if line]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise FileFormatError(file, f"cannot be read as a motion table ({error})") from error
-    names = list(table.dtype.names or ())
+    names = [name.strip() for name in lines[0]] if lines else []
     columns = [name[2:] for name in names if name.startswith("q_")]
     wanted = ["t"] + [f"{x}_{c}" for x in "qva" for c in columns]
     missing = [name for name in wanted if name not in names]
     if missing or not columns:
         raise FileFormatError(file, f"needs the columns t, q_*, v_*, a_*; missing {', '.join(missing) or 'q_*'}")
-    column = {name: np.atleast_1d(np.asarray(table[name], dtype=np.float64)) for name in wanted}
+    if len(set(names)) < len(names):
+        raise FileFormatError(file, f"has two columns of one name among {', '.join(names)}")
+    table = np.array([_numbers(file, k + 2, line, len(names)) for k, line in enumerate(lines[1:])])
+    column = dict(zip(names, table.reshape(-1, len(names)).T, strict=True))
     return Motion(column["t"], *(np.stack([column[f"{x}_{c}"] for c in columns], axis=1) for x in "qva"))
 
 
@@ -187,6 +191,15 @@ def to_file(motion: Motion, path: str | Path, names: tuple[str, ...]) -> None:
     header = ",".join(["t", *(f"{x}_{n}" for x in "qva" for n in names)])
     body = np.column_stack([motion.t, motion.q, motion.v, motion.a])
     np.savetxt(path, body, delimiter=",", header=header, comments="", fmt="%.17g")
+
+
+def _numbers(file: Path, line: int, cells: list[str], width: int) -> list[float]:
+    if len(cells) != width:
+        raise FileFormatError(file, f"row {line} has {len(cells)} cells, the header has {width}")
+    try:
+        return [float(cell) for cell in cells]
+    except ValueError as error:
+        raise FileFormatError(file, f"row {line} is not numeric ({error})") from error
 
 
 def _phase(t: npt.ArrayLike, duration: float | None) -> tuple[Array, float, Array, Array]:

@@ -1,0 +1,159 @@
+"""A ClosedChain is checked once, copied in, and cannot be changed."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from mechanisms import AT_ORIGIN, add, at, body, double_four_bar, five_bar, point, rscr, slider_crank
+
+import fivebar_pin as fb
+from fivebar_pin.chain import Visual
+from fivebar_pin.errors import FiveBarPinError, InvalidInputError, UnknownNameError
+
+
+def arms() -> pin.Model:
+    """Return two hinged arms with a frame at each tip."""
+    model = pin.Model()
+    model.name = "arms"
+    for name in ("a", "b"):
+        joint = add(model, 0, pin.JointModelRZ(), at(), name, body())
+        point(model, joint, f"tip_{name}", at(1.0))
+    add(model, 0, pin.JointModelSpherical(), at(), "ball", body())
+    return model
+
+
+TIPS = fb.Closure(("tip_a", "tip_b"))
+
+
+def test_model_is_copied_and_the_callers_stays_untouched():
+    model = arms()
+    chain = fb.ClosedChain(model, (TIPS,), ("a",))
+    before = model.copy()
+    chain.model.gravity.linear = np.array([1.0, 2.0, 3.0])
+    chain.with_gravity([4.0, 5.0, 6.0])
+    chain.with_inertias({"a": body(9)})
+    assert model == before
+    model.inertias[1] = pin.Inertia.Zero()
+    assert chain.model.inertias[1].mass > 0.9
+
+
+def test_fields_cannot_be_set():
+    chain = fb.ClosedChain(arms(), (TIPS,), ("a",))
+    for name in ("model", "closures", "actuated", "name"):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(chain, name, None)
+    with pytest.raises(ValueError, match="read-only"):
+        chain.inertial_parameters[0, 0] = 1.0
+
+
+def test_sizes_and_indices_follow_pinocchio():
+    chain, _ = rscr()
+    assert (chain.nq, chain.nv, chain.na) == (chain.model.nq, chain.model.nv, 1)
+    assert chain.joints == ("crank", "ball", "turn", "slide")
+    assert chain.actuated_index.tolist() == [0]
+    assert chain.passive_index.tolist() == [1, 2, 3, 4, 5]
+    swapped = five_bar().with_actuated(["right_elbow", "left"])
+    assert swapped.actuated_index.tolist() == [3, 0]
+    assert swapped.passive_index.tolist() == [1, 2]
+
+
+def test_mass_and_length_are_those_of_the_parts():
+    chain = double_four_bar()
+    assert chain.mass == pytest.approx(5.0, rel=1e-15)
+    assert chain.length == pytest.approx(np.mean([1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0, 1.0]), rel=1e-15)
+    model = pin.Model()
+    add(model, 0, pin.JointModelRZ(), AT_ORIGIN, "only", body())
+    assert fb.ClosedChain(model, (), ()).length == 1.0
+
+
+def test_inertial_parameters_go_out_and_come_back():
+    chain = five_bar()
+    doubled = chain.with_inertial_parameters(2.0 * chain.inertial_parameters)
+    np.testing.assert_allclose(doubled.inertial_parameters, 2.0 * chain.inertial_parameters, rtol=0.0, atol=1e-15)
+    one = chain.with_inertias({"right": body(7, mass=3.0)})
+    np.testing.assert_allclose(one.inertial_parameters[2], body(7, mass=3.0).toDynamicParameters(), rtol=0.0, atol=0.0)
+    np.testing.assert_array_equal(one.inertial_parameters[[0, 1, 3]], chain.inertial_parameters[[0, 1, 3]])
+
+
+def test_gravity_and_motors_are_exchanged_without_touching_the_rest():
+    chain = five_bar()
+    other = chain.with_gravity([1.0, 2.0, 3.0]).with_actuated(["right", "right_elbow"])
+    np.testing.assert_array_equal(other.model.gravity.linear, [1.0, 2.0, 3.0])
+    assert (other.actuated, other.closures, other.name) == (("right", "right_elbow"), chain.closures, chain.name)
+    np.testing.assert_array_equal(chain.model.gravity.linear, [0.3, -9.81, 0.4])
+
+
+def test_it_says_what_it_is():
+    text = repr(fb.ClosedChain(arms(), (TIPS,), ("a",)))
+    assert text == ("ClosedChain('arms': 3 joints, nq = 6, nv = 5; closures: tip_a~tip_b (3d); actuated: a)")
+    assert "closures: none; actuated: none" in repr(fb.ClosedChain(pin.Model(), (), ()))
+    assert fb.ClosedChain(pin.Model(), (), ()).name == "mechanism"
+
+
+@pytest.mark.parametrize(
+    ("closures", "actuated", "kind", "message"),
+    [
+        ((fb.Closure(("tip_a", "tip_c")),), (), UnknownNameError, r"frame of closure .* 'tip_c'; known: .*tip_b"),
+        ((fb.Closure(("tip_a", "a_body")),), (), InvalidInputError, r"joins two frames of one body \(a\)"),
+        ((TIPS, fb.Closure(("tip_b", "tip_a"), name=TIPS.name)), (), InvalidInputError, "closure names .* must differ"),
+        ((TIPS,), ("a", "A"), UnknownNameError, "Unknown actuated joint 'A'; known: a, b, ball"),
+        ((TIPS,), ("a", "a"), InvalidInputError, "'a' is named twice"),
+        ((TIPS,), ("ball",), InvalidInputError, r"actuated joint ball = 'nv = 3' but must have one degree of freedom"),
+        ((TIPS,), ("universe",), UnknownNameError, "Unknown actuated joint 'universe'"),
+    ],
+)
+def test_wrong_closures_and_motors_are_refused(closures, actuated, kind, message):
+    with pytest.raises(kind, match=message):
+        fb.ClosedChain(arms(), closures, actuated)
+
+
+def test_close_names_are_suggested():
+    with pytest.raises(UnknownNameError, match="Did you mean 'tip_b'"):
+        fb.ClosedChain(arms(), (fb.Closure(("tip_a", "tip_bb")),), ())
+
+
+def test_trees_with_impossible_numbers_are_refused():
+    model = arms()
+    model.jointPlacements[2] = pin.SE3(np.eye(3), np.array([np.nan, 0.0, 0.0]))
+    with pytest.raises(InvalidInputError, match=r"placement of joint b .* must be finite"):
+        fb.ClosedChain(model, (), ())
+    model = arms()
+    model.inertias[1] = pin.Inertia(np.inf, np.zeros(3), np.eye(3))
+    with pytest.raises(InvalidInputError, match=r"inertia of joint a .* must be finite"):
+        fb.ClosedChain(model, (), ())
+    model = arms()
+    model.inertias[3] = pin.Inertia(-1.0, np.zeros(3), np.eye(3))
+    with pytest.raises(InvalidInputError, match=r"mass of the body of joint ball = -1\.0 but must not be negative"):
+        fb.ClosedChain(model, (), ())
+
+
+def test_replacements_are_checked_too():
+    chain = slider_crank()
+    with pytest.raises(UnknownNameError, match="Unknown joint 'piston'; known: crank, rod, slider"):
+        chain.with_inertias({"piston": body()})
+    with pytest.raises(InvalidInputError, match=r"shape of inertial parameters = \(2, 10\) but must be \(3, 10\)"):
+        chain.with_inertial_parameters(np.ones((2, 10)))
+    with pytest.raises(InvalidInputError, match=r"gravity\[1\] = nan but must be finite"):
+        chain.with_gravity([0.0, np.nan, 0.0])
+    with pytest.raises(UnknownNameError, match="actuated joint 'wheel'"):
+        chain.with_actuated(["wheel"])
+
+
+def test_visuals_are_checked():
+    with pytest.raises(UnknownNameError, match="visual shape 'cone'; known: box, cylinder, capsule, sphere, mesh"):
+        Visual("a_body", "cone", (1.0,))
+    with pytest.raises(InvalidInputError, match=r"size of box on a_body = \(1,\) but must be \(3,\)"):
+        Visual("a_body", "box", (1.0,))
+    with pytest.raises(UnknownNameError, match="Unknown frame 'a_bod'"):
+        fb.ClosedChain(arms(), (), (), visuals=(Visual("a_bod", "sphere", (1.0,)),))
+    visual = Visual("a_body", "sphere", (1.0,))
+    with pytest.raises(ValueError, match="read-only"):
+        visual.placement[0, 0] = 2.0
+
+
+def test_every_error_belongs_to_the_family():
+    for kind in (InvalidInputError, UnknownNameError):
+        assert issubclass(kind, FiveBarPinError)
