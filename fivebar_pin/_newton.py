@@ -44,6 +44,8 @@ def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:
     """
     n = q.shape[0]
     q = np.array(q)
+    if not loops.m:
+        return Closed(q, np.zeros(n), np.zeros(n), np.ones(n), np.ones(n))
     size = np.full(n, np.inf)
     correction, sigma, sign = np.zeros(n), np.zeros(n), np.zeros(n)
     todo, last = np.arange(n), np.zeros(n, dtype=np.bool_)

@@ -110,7 +110,7 @@ class Tree:
         p = [np.empty((n, 3)) for _ in range(self.njoints)]
         S = np.empty((n, 6, self.nv))
         for i in range(n):
-            S[i] = np.reshape(pin.computeJointJacobians(self._model, data, q[i]), (6, self.nv)).reshape(6, self.nv)
+            S[i] = pin.computeJointJacobians(self._model, data, q[i]).reshape(6, self.nv)
             for j, M in enumerate(data.oMi):
                 R[j][i], p[j][i] = M.rotation, M.translation
         return Poses(R, p, S)
