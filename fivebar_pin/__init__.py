@@ -18,10 +18,12 @@ from typing import TYPE_CHECKING, Any
 from fivebar_pin import motion
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.diagnosis import Diagnosis, diagnose
 from fivebar_pin.dynamics import Loads, inverse_dynamics
 from fivebar_pin.errors import FiveBarPinError
 from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
 from fivebar_pin.motion import Motion
+from fivebar_pin.simulation import JointSpring, Spring, forward_dynamics, simulate
 from fivebar_pin.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -32,9 +34,12 @@ __all__ = [
     "ClosedChain",
     "Closure",
     "ClosureKind",
+    "Diagnosis",
     "FiveBarPinError",
+    "JointSpring",
     "Loads",
     "Motion",
+    "Spring",
     "Trajectory",
     "Visual",
     "assemble",
@@ -42,13 +47,16 @@ __all__ = [
     "balancing",
     "closure_residual",
     "complement",
+    "diagnose",
     "drive",
+    "forward_dynamics",
     "inverse_dynamics",
     "io",
     "load",
     "motion",
     "paper",
     "save",
+    "simulate",
     "viz",
 ]
 
