@@ -87,17 +87,30 @@ class _Writer:
         return lines
 
     def body(self, joint: JointEntry, indent: str) -> list[str]:
-        lines = [
-            f"{indent}<body name={quoteattr(joint.child)}{_pose(joint.placement)}>",
-            self.joint(joint, indent + "  "),
-        ]
-        inertia = self.tree.links[joint.child].inertia
+        stacked = self.stacked(joint)
+        link = stacked[-1].child
+        lines = [f"{indent}<body name={quoteattr(link)}{_pose(joint.placement)}>"]
+        lines += [self.joint(each, indent + "  ") for each in stacked]
+        inertia = self.tree.links[link].inertia
         if inertia is not None:
             I = np.array(inertia.inertia)
             full = numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]])
             stated = f'pos="{numbers(inertia.lever)}" mass="{numbers([inertia.mass])}" fullinertia="{full}"'
             lines.append(f"{indent}  <inertial {stated}/>")
-        return [*lines, *self.contents(joint.child, indent + "  "), f"{indent}</body>"]
+        return [*lines, *self.contents(link, indent + "  "), f"{indent}</body>"]
+
+    def stacked(self, joint: JointEntry) -> list[JointEntry]:
+        """Return the joints that share one body: massless links between joints at one place need none of their own."""
+        joints = [joint]
+        while True:
+            link = self.tree.links[joints[-1].child]
+            below = self.below.get(link.name, [])
+            single = len(below) == 1 and _KINDS.get(below[0].kind) in ("hinge", "slide", "ball")
+            if link.inertia or link.visuals or link.name in self.extra_sites or not single or joint.kind == "floating":
+                return joints
+            if not np.array_equal(below[0].placement, np.eye(4)):
+                return joints
+            joints.append(below[0])
 
     def joint(self, joint: JointEntry, indent: str) -> str:
         model, j = self.model, self.model.getJointId(joint.name)

@@ -122,9 +122,10 @@ class Reader:
         if element is None:
             return
         children = [str(child.tag) for child in element] if tags else []
-        for kind, found, known in (("element", children, tags), ("attribute", [*element.attrib], words)):
+        groups = (("element", children, tags, 0.75), ("attribute", [*element.attrib], words, 0.8))
+        for kind, found, known, cutoff in groups:
             for name in found:
-                near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.75) if name not in known else []
+                near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=cutoff) if name not in known else []
                 if near:
                     raise self.fail(where, f"has an unknown {kind} {name!r}; did you mean {near[0]!r}?")
 
