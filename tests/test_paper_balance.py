@@ -208,7 +208,7 @@ def test_bad_bounds_and_totals_are_refused():
 
 def test_an_unreachable_tolerance_is_an_error_not_an_answer():
     """A half-converged iterate is never returned."""
-    with pytest.raises(SolverError, match="None of 16 starts reached a minimum") as caught:
+    with pytest.raises(SolverError, match=r"None of \d+ starts reached a minimum") as caught:
         paper.balance(CASE_I, tolerance=1e-30)
     assert caught.value.tolerance == 1e-30
     assert 0.0 < caught.value.residual < 1e-12

@@ -2,12 +2,14 @@
 
 from fivebar_pin.paper import matrices
 from fivebar_pin.paper.audit import audit_table_1
+from fivebar_pin.paper.closed_form import solve, solve_states
 from fivebar_pin.paper.compare import Comparison, compare_complements
 from fivebar_pin.paper.equations import Conditions, conditions
 from fivebar_pin.paper.erratum import Erratum, errata
-from fivebar_pin.paper.linkage import AssemblyMode, FiveBar, default_motion, table_1
+from fivebar_pin.paper.linkage import AssemblyMode, FiveBar
 from fivebar_pin.paper.optimum import Optimum, balance, balance_masses
-from fivebar_pin.paper.solution import Solution, solve, solve_states
+from fivebar_pin.paper.solution import Solution
+from fivebar_pin.paper.table import default_motion, table_1
 from fivebar_pin.paper.velocity_ratios import ratio_rates, ratios
 
 __all__ = [

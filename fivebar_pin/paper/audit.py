@@ -9,10 +9,11 @@ from itertools import product
 import numpy as np
 
 from fivebar_pin.motion import Motion
+from fivebar_pin.paper.closed_form import solve
 from fivebar_pin.paper.equations import Conditions, conditions
-from fivebar_pin.paper.linkage import AssemblyMode, FiveBar, default_motion, table_1
+from fivebar_pin.paper.linkage import AssemblyMode, FiveBar
 from fivebar_pin.paper.optimum import balance
-from fivebar_pin.paper.solution import solve
+from fivebar_pin.paper.table import default_motion, table_1
 
 __all__ = ["READINGS", "AuditRow", "Loading", "audit_table_1", "loading"]
 

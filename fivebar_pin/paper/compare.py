@@ -16,8 +16,10 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper import matrices
-from fivebar_pin.paper.linkage import AssemblyMode, FiveBar, default_motion
-from fivebar_pin.paper.solution import Solution, solve
+from fivebar_pin.paper.closed_form import solve
+from fivebar_pin.paper.linkage import AssemblyMode, FiveBar
+from fivebar_pin.paper.solution import Solution
+from fivebar_pin.paper.table import default_motion
 
 __all__ = ["Comparison", "compare_complements"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +12,7 @@ from fivebar_pin.errors import InfeasibleError, InvalidInputError, SolverError
 from fivebar_pin.paper.equations import Conditions, conditions
 from fivebar_pin.paper.linkage import FiveBar
 from fivebar_pin.paper.polar import Problem, Stationary, climb
-from fivebar_pin.paper.rings import common_points
+from fivebar_pin.paper.starts import balanced_points, mixtures
 
 __all__ = ["Optimum", "balance", "balance_masses"]
 
@@ -89,7 +88,7 @@ def balance(
     """
     mu = linkage.mass_ratios
     problem = _problem(weights, rho_bounds, (mu, mu))
-    starts = _starts(problem, mu)
+    starts = balanced_points(problem, mu, each=1 if rho_bounds is None else 3)  # bounds may cut the plane apart
     return _best(linkage, problem, starts, tolerance, float(linkage.masses.sum()))
 
 
@@ -131,9 +130,9 @@ def balance_masses(
     problem = _problem(weights, rho_bounds, (low / total, np.minimum(high / total, 1.0)))
     starts: list[Array] = []
     reasons: list[InfeasibleError] = []
-    for mu in _mixtures(problem.low[8:], problem.high[8:]):
+    for mu in mixtures(problem.low[8:], problem.high[8:]):
         try:
-            starts += _starts(problem, mu)[:6]
+            starts += balanced_points(problem, mu, each=1)[:6]
         except InfeasibleError as error:
             reasons.append(error)
     if not starts:
@@ -163,58 +162,6 @@ def _bounds(name: str, bounds: Bounds) -> tuple[Array, Array]:
     return low, high
 
 
-def _starts(problem: Problem, mu: Array) -> list[Array]:
-    """Return the best balanced points for each choice of the side of every joint, best first.
-
-    mu2 l2 = s is the free complex number; |l_i| within its bounds makes a ring about -shift_i for s.
-    """
-    shift = np.array([-mu[1], 0.0, mu[2], mu[2] + mu[3]])  # mu_i l_i = s + shift_i
-    low, high = problem.low[4:8], problem.high[4:8]
-    inner = np.where((low <= 0.0) & (high >= 0.0), 0.0, np.minimum(np.abs(low), np.abs(high)))
-    outer = np.maximum(np.abs(low), np.abs(high))
-    s = _grid(shift)
-    corners, violation = common_points(-shift, mu * inner, mu * outer)
-    if violation > 1e-12:
-        raise InfeasibleError(
-            f"No balanced linkage has rho between {low.tolist()} and {high.tolist()} with the mass ratios "
-            f"{np.round(mu, 6).tolist()}: the bounds would have to give way by {violation:.3g} in mu rho. "
-            "Widen rho_bounds or change the masses."
-        )
-    s = np.concatenate([s, corners])
-    l = (s[:, None] + shift) / mu
-    starts = []
-    for sides in product((0.0, np.pi), repeat=4):
-        alpha = np.angle(l * np.exp(1j * np.array(sides)))
-        rho = (l * np.exp(-1j * alpha)).real
-        inside = np.all((rho >= low - 1e-9) & (rho <= high + 1e-9), axis=1)
-        value = problem.weights[0] * np.sum(alpha**2, axis=1) + problem.weights[1] * np.sum((rho - 0.5) ** 2, axis=1)
-        if inside.any():
-            k = int(np.argmin(np.where(inside, value, np.inf)))
-            starts.append((float(value[k]), np.concatenate([alpha[k], rho[k], mu])))
-    return [x for _, x in sorted(starts, key=lambda pair: pair[0])]
-
-
-def _grid(shift: Array) -> npt.NDArray[np.complex128]:
-    """Return points around the centres where single l_i vanish, closer where they lie."""
-    span = 2.0 * float(np.ptp(shift))
-    x = np.concatenate([-np.geomspace(1e-3, 1.0, 16)[::-1], [0.0], np.geomspace(1e-3, 1.0, 16)]) * span
-    around = (x[:, None] + 1j * x[None, :]).ravel()
-    return np.asarray((around[None, :] - shift[:, None]).ravel())
-
-
-def _mixtures(low: Array, high: Array) -> list[Array]:
-    """Return mass ratios within the bounds that add up to one: pushed towards each bound, and in the middle."""
-    found = []
-    for lean in product((0.0, 0.5, 1.0), repeat=4):
-        wish = low + np.array(lean) * (high - low)
-        short = 1.0 - wish.sum()
-        room = (high - wish) if short > 0.0 else (wish - low)
-        if room.sum() >= abs(short) > 0.0 or short == 0.0:
-            found.append(wish + (short * room / room.sum() if short else 0.0))
-    rows = {tuple(np.round(mu, 9)): mu for mu in found}
-    return list(rows.values())[:: max(1, len(rows) // 12)]
-
-
 def _best(linkage: FiveBar, problem: Problem, starts: list[Array], tolerance: float, total: float) -> Optimum:
     points = [climb(problem, start) for start in starts]
     minima = [p for p in points if p.residual <= tolerance and p.curvature >= -1e-9]
@@ -229,6 +176,14 @@ def _best(linkage: FiveBar, problem: Problem, starts: list[Array], tolerance: fl
     minima.sort(key=lambda p: problem.objective(p.x))
     best = minima[0]
     values = [problem.objective(p.x) for p in minima]
+    known = min(problem.objective(x) for x in starts)
+    if values[0] > known + 1e-9 * (1.0 + known):
+        raise SolverError(
+            f"The best minimum found has the objective {values[0]:.6g}, but a balanced linkage with {known:.6g} is "
+            "known: the search missed a minimum. Change the bounds or the weights a little.",
+            residual=values[0] - known,
+            tolerance=1e-9,
+        )
     distinct = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > 1e-9 * (1.0 + v)]
     alpha, rho, mu = best.x[:4], best.x[4:8], best.x[8:]
     masses = total * mu if problem.free[8:].any() else linkage.masses

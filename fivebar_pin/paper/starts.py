@@ -1,0 +1,84 @@
+"""Where to start looking for the optimum: balanced linkages spread over the whole feasible set."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.errors import InfeasibleError
+from fivebar_pin.paper.linkage import CArray
+from fivebar_pin.paper.polar import Problem
+from fivebar_pin.paper.rings import common_points
+
+__all__ = ["balanced_points", "mixtures"]
+
+
+def balanced_points(problem: Problem, mu: Array, *, each: int) -> list[Array]:
+    """Return good balanced points for each choice of the side of every joint, best first.
+
+    mu2 l2 = s is the free complex number; |l_i| within its bounds makes a ring about -shift_i for s.
+    """
+    shift = np.array([-mu[1], 0.0, mu[2], mu[2] + mu[3]])  # mu_i l_i = s + shift_i
+    low, high = problem.low[4:8], problem.high[4:8]
+    inner = np.where((low <= 0.0) & (high >= 0.0), 0.0, np.minimum(np.abs(low), np.abs(high)))
+    outer = np.maximum(np.abs(low), np.abs(high))
+    corners, violation = common_points(-shift, mu * inner, mu * outer)
+    if violation > 1e-12:
+        raise InfeasibleError(
+            f"No balanced linkage has rho between {low.tolist()} and {high.tolist()} with the mass ratios "
+            f"{np.round(mu, 6).tolist()}: the bounds would have to give way by {violation:.3g} in mu rho. "
+            "Widen rho_bounds or change the masses."
+        )
+    s = np.concatenate([corners, _grid(shift), _ring_grid(-shift, mu * inner, mu * outer)])
+    l = (s[:, None] + shift) / mu
+    starts: list[tuple[float, Array]] = []
+    for sides in product((0.0, np.pi), repeat=4):
+        alpha = np.angle(l * np.exp(1j * np.array(sides)))
+        rho = (l * np.exp(-1j * alpha)).real
+        inside = np.all((rho >= low - 1e-9) & (rho <= high + 1e-9), axis=1)
+        value = problem.weights[0] * np.sum(alpha**2, axis=1) + problem.weights[1] * np.sum((rho - 0.5) ** 2, axis=1)
+        for k in _apart(np.where(inside, value, np.inf), s, 0.1 * float(np.ptp(shift)), each):
+            starts.append((float(value[k]), np.concatenate([alpha[k], rho[k], mu])))
+    return [x for _, x in sorted(starts, key=lambda pair: pair[0])]
+
+
+def _apart(value: Array, s: CArray, distance: float, count: int) -> list[int]:
+    """Return the indices of the best points that keep a distance from each other."""
+    left = value.copy()
+    found: list[int] = []
+    while len(found) < count and np.isfinite(left.min()):
+        found.append(int(np.argmin(left)))
+        left[np.abs(s - s[found[-1]]) < distance] = np.inf
+    return found
+
+
+def _grid(shift: Array) -> CArray:
+    """Return points around the centres where single l_i vanish, closer where they lie."""
+    span = 2.0 * float(np.ptp(shift))
+    x = np.concatenate([-np.geomspace(1e-3, 1.0, 16)[::-1], [0.0], np.geomspace(1e-3, 1.0, 16)]) * span
+    around = (x[:, None] + 1j * x[None, :]).ravel()
+    return np.asarray((around[None, :] - shift[:, None]).ravel())
+
+
+def _ring_grid(centres: Array, inner: Array, outer: Array) -> CArray:
+    """Return points of the smallest ring, none if no ring is bounded."""
+    k = int(np.argmin(outer))
+    if not np.isfinite(outer[k]):
+        return np.empty(0, dtype=np.complex128)
+    radius = np.linspace(inner[k], outer[k], 41)
+    return np.asarray((centres[k] + radius[:, None] * np.exp(1j * np.linspace(-np.pi, np.pi, 145))).ravel())
+
+
+def mixtures(low: Array, high: Array) -> list[Array]:
+    """Return mass ratios within the bounds that add up to one: pushed towards each bound, and in the middle."""
+    found = []
+    for lean in product((0.0, 0.5, 1.0), repeat=4):
+        wish = low + np.array(lean) * (high - low)
+        short = 1.0 - wish.sum()
+        room = (high - wish) if short > 0.0 else (wish - low)
+        if room.sum() >= abs(short) > 0.0 or short == 0.0:
+            found.append(wish + (short * room / room.sum() if short else 0.0))
+    rows = {tuple(np.round(mu, 9)): mu for mu in found}
+    return list(rows.values())[:: max(1, len(rows) // 12)]
