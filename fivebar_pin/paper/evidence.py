@@ -20,7 +20,6 @@ from fivebar_pin.paper.table import default_motion, table_1
 from fivebar_pin.paper.velocity_ratios import phi_loop, printed_theta_slopes, ratio_rates, ratios, theta_loop
 
 __all__ = [
-    
     "arcsine",
     "at_rest",
     "balanced",
@@ -39,7 +38,6 @@ __all__ = [
     "ratio",
     "ratio_slope",
     "torque",
-,
 ]
 
 Pair = tuple[float, float]
