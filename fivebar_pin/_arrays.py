@@ -17,16 +17,25 @@ def frozen(values: npt.ArrayLike) -> Array:
     return array
 
 
+def numeric(name: str, values: npt.ArrayLike) -> Array:
+    """Return a read-only float copy of any shape.
+
+    Raises:
+        InvalidInputError: not numeric, or ragged.
+    """
+    try:
+        return frozen(values)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(name, values, f"must be an array of numbers ({error})") from error
+
+
 def checked(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """Return a read-only float copy of the given shape (None: any length), finite throughout.
 
     Raises:
         InvalidInputError: not numeric, wrong shape, or not finite.
     """
-    try:
-        array = frozen(values)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(name, values, f"must be an array of numbers ({error})") from error
+    array = numeric(name, values)
     wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
     if array.ndim != len(shape) or any(s is not None and s != g for s, g in zip(shape, array.shape, strict=True)):
         raise InvalidInputError(f"shape of {name}", array.shape, f"must be {wanted}")
