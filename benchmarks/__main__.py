@@ -7,15 +7,22 @@ import argparse
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import roads
+from benchmarks import ladder, roads
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--samples", type=int, nargs="+", default=[1, 100, 1000, 100000])
+    parser.add_argument("--which", nargs="+", choices=("roads", "ladder"), default=["roads", "ladder"])
     chosen = parser.parse_args()
     console = Console(width=150)
-    _show(console, "Five-bar, torque and shaking wrench, per sample", roads.HEADINGS, roads.rows(tuple(chosen.samples)))
+    if "roads" in chosen.which:
+        rows = roads.rows(tuple(chosen.samples))
+        _show(console, "Five-bar, torque and shaking wrench, per sample", roads.HEADINGS, rows)
+    if "ladder" in chosen.which:
+        rows, side, stacked = ladder.rows()
+        _show(console, "N five-bars, torque and shaking wrench, per sample", ladder.HEADINGS, rows)
+        console.print(f"cost per sample grows as N^{side:.2f} side by side, N^{stacked:.2f} stacked")
 
 
 def _show(console: Console, title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from fivebar_pin import closures as rows
 from fivebar_pin._arrays import Array
@@ -23,6 +25,7 @@ _GENERIC_SAMPLES = 12
 class _Anchored:
     """A closure with its frames resolved to joints."""
 
+    index: int
     closure: Closure
     joints: tuple[int, int]
     R: tuple[Array, Array]
@@ -33,18 +36,56 @@ class _Anchored:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Group:
+    """Closures that share passive joints; groups are independent of each other given the actuated coordinates."""
+
+    members: tuple[int, ...]  # closures
+    rows: npt.NDArray[np.intp]  # of J
+    columns: npt.NDArray[np.intp]  # velocity coordinates that move some of the rows
+    passive: npt.NDArray[np.intp]  # positions in `Loops.passive`
+    passive_columns: npt.NDArray[np.intp]  # the same, positions in `columns`
+    actuated: npt.NDArray[np.intp]  # positions in `Loops.actuated`
+    actuated_columns: npt.NDArray[np.intp]
+    reduce: Array  # independent row combinations (r, rows)
+    scale: Array  # of the passive columns
+
+    @property
+    def is_square(self) -> bool:
+        return bool(self.reduce.shape[0] == self.passive.size)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PassiveMap:
     """What takes the actuated coordinates to the passive ones at a batch of configurations.
 
     Attributes:
-        X: pseudo-inverse of the passive columns of the reduced closure Jacobian (n, np, r).
+        groups: the independent groups of closures.
+        X: per group, pseudo-inverse of the passive columns of its reduced rows (n, np_g, r_g); nan where singular.
         sigma: lower estimate of their smallest singular value, scaled [-] (n,).
-        sign: sign of their determinant where they are square, else one (n,).
+        sign: sign of their determinant, per group; one where they are not square (n, groups).
+        size: number of passive and actuated coordinates.
     """
 
-    X: Array
+    groups: list[_Group]
+    X: list[Array]
     sigma: Array
     sign: Array
+    size: tuple[int, int]
+
+    def solve(self, rows: Array) -> Array:
+        """Return the passive tangent that changes the closure rows (n, m) by this much, (n, np)."""
+        out = np.zeros((rows.shape[0], self.size[0]))
+        for g, X in zip(self.groups, self.X, strict=True):
+            out[:, g.passive] = np.matmul(X, (rows[:, g.rows] @ g.reduce.T)[..., None])[..., 0]
+        return out
+
+    def complement(self, blocks: list[Array]) -> Array:
+        """Return the passive rows of the complement (n, np, na) from the Jacobian's blocks."""
+        out = np.zeros((self.sigma.size, *self.size))
+        for g, X, J in zip(self.groups, self.X, blocks, strict=True):
+            if g.actuated.size:
+                out[:, g.passive[:, None], g.actuated] = -np.matmul(X, np.matmul(g.reduce, J[:, :, g.actuated_columns]))
+        return out
 
 
 class Loops:
@@ -61,6 +102,7 @@ class Loops:
     def __init__(self, chain: ClosedChain) -> None:
         model = chain.model
         self.tree = Tree(model)
+        self._neutral = pin.neutral(model)
         self.closures = chain.closures
         self.actuated, self.passive = chain.actuated_index, chain.passive_index
         self.length = chain.length
@@ -72,6 +114,7 @@ class Loops:
             sign = self.tree.support[j].astype(float) - self.tree.support[i].astype(float)
             self.anchored.append(
                 _Anchored(
+                    len(self.anchored),
                     closure,
                     (i, j),
                     (np.array(frames[0].placement.rotation), np.array(frames[1].placement.rotation)),
@@ -87,8 +130,18 @@ class Loops:
             [np.r_[np.full(3, 1.0 / self.length), np.ones(c.kind.rows - 3)] for c in chain.closures] or [np.zeros(0)]
         )
         self.column_scale = np.array([1.0 if self.tree.is_angle(k) else self.length for k in range(self.tree.nv)])
-        self.reduce = self._independent_rows()
-        self.is_square = self.reduce.shape[0] == self.passive.size
+        self._groups = [self._group(members) for members in self._members()]
+        self.reduce = np.zeros((sum(g.reduce.shape[0] for g in self._groups), self.m))
+        done = 0
+        for g in self._groups:
+            r = g.reduce.shape[0]
+            self.reduce[done : done + r, g.rows] = g.reduce
+            done += r
+
+    @property
+    def groups(self) -> int:
+        """Number of independent groups of closures."""
+        return len(self._groups)
 
     @property
     def r(self) -> int:
@@ -111,16 +164,31 @@ class Loops:
         return out
 
     def residual(self, pairs: list[FramePair]) -> Array:
-        """Return all closure rows (n, m) [m, rad]."""
+        """Return all closure rows (n, m) [m, rad]; the chain has closures."""
         return np.concatenate([rows.residual(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
 
     def jacobian(self, poses: Poses, pairs: list[FramePair]) -> Array:
         """Return the closure Jacobian J (n, m, nv): residual rate = J v."""
         J = np.zeros((poses.S.shape[0], self.m, self.tree.nv))
-        for c, pair in zip(self.anchored, pairs, strict=True):
-            block = np.matmul(rows.selector(c.closure, pair), poses.S[:, :, c.moved] * c.sign[c.moved])
-            J[:, c.rows, c.moved] = block
+        for g, block in zip(self._groups, self.blocks(poses, pairs), strict=True):
+            J[:, g.rows[:, None], g.columns] = block
         return J
+
+    def blocks(self, poses: Poses, pairs: list[FramePair]) -> list[Array]:
+        """Return the same per independent group of closures, without the zeros."""
+        out = []
+        for g in self._groups:
+            block = np.zeros((poses.S.shape[0], g.rows.size, g.columns.size))
+            start = 0
+            for c in (self.anchored[k] for k in g.members):
+                m = c.closure.kind.rows
+                at = np.searchsorted(g.columns, c.moved)
+                block[:, start : start + m, at] = np.matmul(
+                    rows.selector(c.closure, pairs[c.index]), poses.S[:, :, c.moved] * c.sign[c.moved]
+                )
+                start += m
+            out.append(block)
+        return out
 
     def drift(self, pairs: list[FramePair], rates: Rates) -> Array:
         """Return the second rate of the residual at zero joint accelerations (n, m)."""
@@ -137,25 +205,24 @@ class Loops:
         flags = [rows.opposed(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)]
         return np.asarray(np.any(flags, axis=0))
 
-    def passive_map(self, J: Array) -> PassiveMap:
-        """Invert the passive columns of J (n, m, nv). Singular samples get sigma = 0 and X = nan."""
-        Jp = np.matmul(self.reduce, J[:, :, self.passive]) * self.column_scale[self.passive]
-        n = J.shape[0]
-        if not self.passive.size:
-            return PassiveMap(np.zeros((n, 0, self.r)), np.ones(n), np.ones(n))
-        if self.is_square:
-            X, determinant = inverse(Jp)
-            sign = np.sign(determinant)
-            with np.errstate(invalid="ignore", over="ignore"):
-                sigma = 1.0 / np.sqrt(np.einsum("nij,nij->n", X, X))
-            sigma = np.where(np.isfinite(sigma), sigma, 0.0)
-        else:
-            sign = np.ones(n)
-            U, s, Vt = np.linalg.svd(Jp, full_matrices=False)
-            sigma = s[:, -1] if self.r >= self.passive.size else np.zeros(n)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                X = np.matmul(np.swapaxes(Vt, 1, 2) / s[:, None, :], np.swapaxes(U, 1, 2))
-        return PassiveMap(self.column_scale[self.passive][:, None] * X, sigma, sign)
+    def passive_map(self, blocks: list[Array]) -> PassiveMap:
+        """Invert the passive columns of the Jacobian's blocks. Singular samples get sigma = 0 and X = nan."""
+        n = blocks[0].shape[0] if blocks else 1
+        X, sigma, sign = [], np.full(n, 1.0), np.ones((n, len(self._groups)))
+        for k, (g, J) in enumerate(zip(self._groups, blocks, strict=True)):
+            Jp = np.matmul(g.reduce, J[:, :, g.passive_columns]) * g.scale
+            if g.is_square:
+                inverted, determinant = inverse(Jp)
+                sign[:, k] = np.sign(determinant)
+                with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+                    smallest = 1.0 / np.sqrt(np.einsum("nij,nij->n", inverted, inverted))
+            else:
+                inverted, smallest = _pseudo_inverse(Jp)
+            X.append(g.scale[:, None] * inverted)
+            if g.passive.size:
+                smallest = np.where(np.isfinite(smallest), smallest, 0.0)
+                sigma = smallest if len(self._groups) == 1 else np.minimum(sigma, smallest)
+        return PassiveMap(self._groups, X, sigma, sign, (self.passive.size, self.actuated.size))
 
     def rank(self, J: Array, *, tolerance: float = RANK_TOLERANCE) -> int:
         """Return the rank of one closure Jacobian (m, nv), scaled so that lengths and units do not matter."""
@@ -176,31 +243,69 @@ class Loops:
 
     def require_determined(self) -> None:
         """Raise unless the actuated joints can determine the motion."""
-        if self.r < self.passive.size:
+        lacking = self.passive.size - sum(min(g.reduce.shape[0], g.passive.size) for g in self._groups)
+        if lacking:
             raise InvalidInputError(
                 "actuated joints",
                 f"{self.actuated.size} for {self.tree.nv} coordinates and {self.r} independent closure rows",
-                f"leave {self.passive.size - self.r} coordinate(s) undetermined",
+                f"leave {lacking} coordinate(s) undetermined",
                 "Actuate more joints; diagnose(chain) lists the sets that determine the motion.",
             )
 
-    def _independent_rows(self) -> Array:
-        """Find the row combinations that are independent at generic configurations."""
-        if not self.closures:
-            return np.zeros((0, 0))
-        rng = np.random.default_rng(7)
-        import pinocchio as pin
+    def _members(self) -> list[tuple[int, ...]]:
+        """Gather closures that share a passive joint."""
+        groups: list[tuple[set[int], list[int]]] = []
+        passive = set(self.passive.tolist())
+        for c in self.anchored:
+            columns, members = set(c.moved.tolist()) & passive, [c.index]
+            apart = []
+            for other_columns, other_members in groups:
+                if columns & other_columns:
+                    columns, members = columns | other_columns, other_members + members
+                else:
+                    apart.append((other_columns, other_members))
+            groups = [*apart, (columns, members)]
+        return sorted(tuple(sorted(members)) for _, members in groups)
 
-        tangent = rng.uniform(-np.pi, np.pi, (_GENERIC_SAMPLES, self.tree.nv)) * self.column_scale
-        q0 = np.broadcast_to(pin.neutral(self.tree._model), (_GENERIC_SAMPLES, self.tree.nq))
-        poses = self.tree.poses(self.tree.integrate(np.array(q0), tangent))
-        J = self.jacobian(poses, self.pairs(poses)) * self.row_scale[:, None] * self.column_scale
-        wide = np.concatenate(list(J), axis=1)
+    def _group(self, members: tuple[int, ...]) -> _Group:
+        closures = [self.anchored[k] for k in members]
+        rows_ = np.concatenate([np.arange(c.rows.start, c.rows.stop) for c in closures])
+        columns = np.unique(np.concatenate([c.moved for c in closures]))
+        passive = np.flatnonzero(np.isin(self.passive, columns))
+        actuated = np.flatnonzero(np.isin(self.actuated, columns))
+        return _Group(
+            members=members,
+            rows=rows_,
+            columns=columns,
+            passive=passive,
+            passive_columns=np.searchsorted(columns, self.passive[passive]),
+            actuated=actuated,
+            actuated_columns=np.searchsorted(columns, self.actuated[actuated]),
+            reduce=self._independent_rows(closures, rows_),
+            scale=self.column_scale[self.passive[passive]],
+        )
+
+    def _independent_rows(self, closures: list[_Anchored], rows_: npt.NDArray[np.intp]) -> Array:
+        """Find the row combinations of some closures that are independent at generic configurations."""
+        poses = self._generic_poses
+        pairs = self.pairs(poses)
+        J = np.zeros((_GENERIC_SAMPLES, rows_.size, self.tree.nv))
+        start = 0
+        for c in closures:
+            m = c.closure.kind.rows
+            J[:, start : start + m] = np.matmul(rows.selector(c.closure, pairs[c.index]), poses.S * c.sign)
+            start += m
+        scale = self.row_scale[rows_]
+        wide = np.concatenate(list(J * scale[:, None] * self.column_scale), axis=1)
         U, s, _ = np.linalg.svd(wide, full_matrices=False)
         r = int(np.sum(s > RANK_TOLERANCE * max(s[0], 1e-300)))
-        if r == self.m:
-            return np.diag(self.row_scale)
-        return np.asarray(U[:, :r].T * self.row_scale)
+        return np.diag(scale) if r == rows_.size else np.asarray(U[:, :r].T * scale)
+
+    @cached_property
+    def _generic_poses(self) -> Poses:
+        rng = np.random.default_rng(7)
+        tangent = rng.uniform(-np.pi, np.pi, (_GENERIC_SAMPLES, self.tree.nv)) * self.column_scale
+        return self.tree.poses(self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent))
 
 
 _CACHE: weakref.WeakKeyDictionary[ClosedChain, Loops] = weakref.WeakKeyDictionary()
@@ -223,6 +328,15 @@ def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
         closure=name,
         residual=size,
     )
+
+
+def _pseudo_inverse(M: Array) -> tuple[Array, Array]:
+    """Return the pseudo-inverses of a batch of tall matrices and their smallest singular values."""
+    U, s, Vt = np.linalg.svd(M, full_matrices=False)
+    smallest = s[:, -1] if M.shape[1] >= M.shape[2] > 0 else np.zeros(M.shape[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        X = np.matmul(np.swapaxes(Vt, 1, 2) / s[:, None, :], np.swapaxes(U, 1, 2))
+    return X, smallest
 
 
 def inverse(M: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ class Closed:
         q: configurations (n, nq).
         residual: largest closure residual (n,) [m or rad], all rows.
         correction: size of all the Newton steps together (n,) [rad, or chain lengths].
-        sigma, sign: of the passive Jacobian at the last step, see `PassiveMap` (n,).
+        sigma, sign: of the passive Jacobian at the last step, see `PassiveMap` (n,), (n, groups).
     """
 
     q: Array
@@ -45,9 +45,9 @@ def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:
     n = q.shape[0]
     q = np.array(q)
     if not loops.m:
-        return Closed(q, np.zeros(n), np.zeros(n), np.ones(n), np.ones(n))
+        return Closed(q, np.zeros(n), np.zeros(n), np.ones(n), np.ones((n, 0)))
     size = np.full(n, np.inf)
-    correction, sigma, sign = np.zeros(n), np.zeros(n), np.zeros(n)
+    correction, sigma, sign = np.zeros(n), np.zeros(n), np.zeros((n, loops.groups))
     todo, last = np.arange(n), np.zeros(n, dtype=np.bool_)
     for _ in range(iterations):
         poses = loops.tree.poses(q[todo])
@@ -57,12 +57,13 @@ def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:
         finished = last[todo]
         if finished.all():
             break
-        reduced = full @ loops.reduce.T
-        passive = loops.passive_map(loops.jacobian(poses, pairs))
-        step = -np.matmul(passive.X, reduced[..., None])[..., 0]
+        reduced = full * loops.row_scale
+        passive = loops.passive_map(loops.blocks(poses, pairs))
+        step = -passive.solve(full)
         sigma[todo], sign[todo] = passive.sigma, passive.sign
-        step[finished | ~np.isfinite(step).all(axis=1)] = 0.0
-        size[todo] = np.where(np.isfinite(passive.X).all(axis=(1, 2)), size[todo], np.inf)
+        lost = ~np.isfinite(step).all(axis=1)
+        step[finished | lost] = 0.0
+        size[todo] = np.where(lost, np.inf, size[todo])
         correction[todo] += np.abs(step / loops.column_scale[loops.passive]).max(axis=1, initial=0.0)
         q[todo] = loops.tree.integrate(q[todo], _spread(loops, step))
         last[todo] = np.abs(reduced).max(axis=1, initial=0.0) < _POLISHED

@@ -27,7 +27,7 @@ class _Node:
     q: Array  # (nq,)
     N: Array  # (np, na)
     bend: Array  # change of N per unit of the last step (np, na)
-    sign: float
+    sign: Array  # of the passive determinant, per group of closures
     sigma: float
 
 
@@ -35,21 +35,23 @@ class _Node:
 class _Corrector:
     """The closure rows and the passive map at one configuration."""
 
-    residual: Array  # reduced, scaled (r,)
-    X: Array
+    error: float  # largest scaled residual
+    step: Array  # passive tangent of a Newton step (np,)
     N: Array
-    sign: float
+    sign: Array  # per group of closures
     sigma: float
 
 
 def _correct(loops: Loops, q: Array) -> _Corrector:
     poses = loops.tree.poses(q)
     pairs = loops.pairs(poses)
-    J = loops.jacobian(poses, pairs)
-    passive = loops.passive_map(J)
-    N = -passive.X[0] @ (loops.reduce @ J[0][:, loops.actuated])
-    residual = loops.reduce @ loops.residual(pairs)[0] if loops.m else np.zeros(0)
-    return _Corrector(residual, passive.X[0], N, float(passive.sign[0]), float(passive.sigma[0]))
+    blocks = loops.blocks(poses, pairs)
+    passive = loops.passive_map(blocks)
+    residual = loops.residual(pairs) if loops.m else np.zeros((1, 0))
+    error = float(np.abs(residual * loops.row_scale).max(initial=0.0))
+    return _Corrector(
+        error, -passive.solve(residual)[0], passive.complement(blocks)[0], passive.sign[0], float(passive.sigma[0])
+    )
 
 
 def node_at(loops: Loops, q: Array, x: Array) -> _Node:
@@ -140,14 +142,13 @@ def _try(loops: Loops, node: _Node, x: Array) -> _Node | None:
     correction = 0.0
     for _ in range(_CORRECTIONS):
         here = _correct(loops, q)
-        if here.sign != node.sign or not here.sigma >= SINGULAR:
+        if np.any(here.sign != node.sign) or not here.sigma >= SINGULAR:
             return None
-        error = float(np.abs(here.residual).max(initial=0.0))
-        if error < _GUIDED:
+        if here.error < _GUIDED:
             bend = (here.N - node.N) / length if length > 0.0 else node.bend
             return _Node(np.array(x), q[0], here.N, bend, here.sign, here.sigma)
         step = np.zeros(loops.tree.nv)
-        step[loops.passive] = -here.X @ here.residual
+        step[loops.passive] = here.step
         correction += float(np.abs(step / scale).max())
         if not correction <= _TRUST * size + 1e-9:
             return None
@@ -161,7 +162,11 @@ def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, toleran
     guess = _between(loops, index, nodes, X)
     sign = nodes[0].sign
     closed = polish(loops, guess)
-    trusted = closed_enough(loops, closed.residual, tolerance) & (closed.sign == sign) & (closed.sigma >= SINGULAR)
+    trusted = (
+        closed_enough(loops, closed.residual, tolerance)
+        & (closed.sign == sign).all(axis=1)
+        & (closed.sigma >= SINGULAR)
+    )
     trusted &= closed.correction <= _TRUST * LONGEST
     if trusted.all():
         return closed

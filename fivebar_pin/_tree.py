@@ -81,6 +81,9 @@ class Tree:
         self._model = model
         self._data = model.createData()
         self.joints: list[_Joint | None] = [None, *(_read_joint(model, j) for j in range(1, self.njoints))]
+        self._owner = [
+            joint for joint in self.joints[1:] if joint is not None for _ in range(joint.v.stop - joint.v.start)
+        ]
         self.is_vector_space = all(j is None or j.q.stop - j.q.start == j.v.stop - j.v.start for j in self.joints) and (
             not any(j is not None and j.kind is _Kind.OTHER for j in self.joints)
         )
@@ -134,12 +137,12 @@ class Tree:
         """Whether velocity index k is a rotation (else a length)."""
         return self._of_velocity(k).kind is not _Kind.PRISMATIC
 
+    def is_cyclic(self, k: int) -> bool:
+        """Whether velocity index k turns a joint that does not count its turns."""
+        return self._of_velocity(k).kind is _Kind.UNBOUNDED
+
     def _of_velocity(self, k: int) -> _Joint:
-        for joint in self.joints[1:]:
-            assert joint is not None
-            if joint.v.start <= k < joint.v.stop:
-                return joint
-        raise IndexError(k)
+        return self._owner[k]
 
     def rates(self, q: Array, v: Array, poses: Poses) -> Rates:
         """Return spatial velocities and bias accelerations.  q (n, nq), v (n, nv)."""

@@ -31,7 +31,7 @@ from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Loads", "inverse_dynamics"]
 
-_SAMPLES_PER_THREAD = 512
+_SAMPLES_PER_THREAD = 4096
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked
-from fivebar_pin._loops import Loops, loops_of, open_message
+from fivebar_pin._arrays import Array, checked, numeric
+from fivebar_pin._loops import Loops, PassiveMap, loops_of, open_message
 from fivebar_pin._newton import closed_enough, polish, residual_of, search
 from fivebar_pin._tracking import SINGULAR, follow, node_at, track
 from fivebar_pin.chain import ClosedChain
@@ -27,6 +27,8 @@ from fivebar_pin.trajectory import Trajectory
 __all__ = ["assemble", "assembly_modes", "closure_residual", "complement", "drive"]
 
 CLOSED = 1e-12  # closure residual that counts as closed [m or rad]
+_INDEPENDENT = 1e-7  # scaled closure rate at unit actuated speed above which the motors are in each other's way [-]
+_NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
 _BLOCK = 4096  # samples worked on at a time, so that intermediate arrays stay in cache
 
 
@@ -60,7 +62,7 @@ def assemble(
     """
     loops = loops_of(chain)
     loops.require_determined()
-    x = np.asarray(q_actuated, dtype=np.float64)
+    x = numeric("q_actuated", q_actuated)
     if x.ndim == 2:
         each = [assemble(chain, row, near, starts=starts, seed=seed, tolerance=tolerance) for row in x]
         return np.stack(each) if each else np.zeros((0, chain.nq))
@@ -163,19 +165,21 @@ def complement(chain: ClosedChain, q: npt.ArrayLike) -> Array:
     """
     loops = loops_of(chain)
     loops.require_determined()
+    Q = checked("q", np.atleast_2d(numeric("q", q)), (None, chain.nq))
     single = np.ndim(q) == 1
-    Q = checked("q", np.atleast_2d(np.asarray(q, dtype=np.float64)), (None, chain.nq))
     poses = loops.tree.poses(Q)
-    N, sigma = _complement(loops, loops.jacobian(poses, loops.pairs(poses)))
-    _require_regular(sigma)
+    blocks = loops.blocks(poses, loops.pairs(poses))
+    passive = loops.passive_map(blocks)
+    _require_regular(passive.sigma)
+    N = _whole_complement(loops, passive, blocks, Q.shape[0])
     return np.asarray(N[0]) if single else N
 
 
 def closure_residual(chain: ClosedChain, q: npt.ArrayLike) -> Array:
     """Return every closure row at q: (nq,) -> (m,) or (n, nq) -> (n, m) [m, rad], axes of frame 1."""
     loops = loops_of(chain)
+    Q = checked("q", np.atleast_2d(numeric("q", q)), (None, chain.nq))
     single = np.ndim(q) == 1
-    Q = checked("q", np.atleast_2d(np.asarray(q, dtype=np.float64)), (None, chain.nq))
     if not loops.m:
         return np.zeros((0,) if single else (Q.shape[0], 0))
     residual = residual_of(loops, Q)
@@ -186,28 +190,38 @@ def _consistent(loops: Loops, q: Array, va: Array, aa: Array) -> tuple[Array, Ar
     """Return v, a (n, nv) and N (n, nv, na) from the actuated rates."""
     poses = loops.tree.poses(q)
     pairs = loops.pairs(poses)
-    J = loops.jacobian(poses, pairs)
-    passive = loops.passive_map(J)
-    N = _assembled_complement(loops, J, passive.X)
+    blocks = loops.blocks(poses, pairs)
+    passive = loops.passive_map(blocks)
+    N = _whole_complement(loops, passive, blocks, q.shape[0])
     v = np.matmul(N, va[..., None])[..., 0]
     a = np.matmul(N, aa[..., None])[..., 0]
     if loops.m:
-        drift = loops.drift(pairs, loops.tree.rates(q, v, poses)) @ loops.reduce.T
-        a[:, loops.passive] -= np.matmul(passive.X, drift[..., None])[..., 0]
+        a[:, loops.passive] -= passive.solve(loops.drift(pairs, loops.tree.rates(q, v, poses)))
     return v, a, N
 
 
-def _complement(loops: Loops, J: Array) -> tuple[Array, Array]:
-    passive = loops.passive_map(J)
-    return _assembled_complement(loops, J, passive.X), passive.sigma
-
-
-def _assembled_complement(loops: Loops, J: Array, X: Array) -> Array:
-    N = np.zeros((J.shape[0], loops.tree.nv, loops.actuated.size))
+def _whole_complement(loops: Loops, passive: PassiveMap, blocks: list[Array], n: int) -> Array:
+    """Return N (n, nv, na): ones for the actuated coordinates, -J_p^+ J_a for the passive ones."""
+    N = np.zeros((n, loops.tree.nv, loops.actuated.size))
     N[:, loops.actuated, np.arange(loops.actuated.size)] = 1.0
     if loops.m:
-        N[:, loops.passive] = -np.matmul(X, np.matmul(loops.reduce, J[:, :, loops.actuated]))
+        N[:, loops.passive] = passive.complement(blocks)
+        for group, J in zip(passive.groups, blocks, strict=True):
+            if not group.is_square:
+                _require_independent(loops, loops.row_scale[group.rows, None] * J, N[:, group.columns])
     return N
+
+
+def _require_independent(loops: Loops, J: Array, N: Array) -> None:
+    """Raise unless J N = 0: more rows than passive coordinates may ask too much of the actuated ones."""
+    left = np.abs(np.matmul(J, N * loops.column_scale[loops.actuated])).max(initial=0.0)
+    if left > _INDEPENDENT * max(1.0, float(np.abs(N).max(initial=0.0))):
+        raise InvalidInputError(
+            "actuated joints",
+            f"{loops.actuated.size} for {loops.tree.nv} coordinates",
+            "are not independent: the closures tie them to each other",
+            "Actuate fewer joints; diagnose(chain) lists the sets that determine the motion.",
+        )
 
 
 def _require_regular(sigma: Array) -> None:
@@ -224,7 +238,7 @@ def _require_regular(sigma: Array) -> None:
 def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Array:
     q = np.array(near[None])
     if closed_enough(loops, np.abs(residual_of(loops, q)).max(axis=1, initial=0.0), 1e-8)[0] if loops.m else False:
-        at = np.array([loops.tree.coordinate(q, int(k))[0] for k in loops.actuated])
+        at = _actuated_at(loops, q, x)
         node = node_at(loops, q[0], at)
         if node.sigma >= SINGULAR:
             q = polish(loops, follow(loops, node, x).q[None]).q
@@ -233,13 +247,31 @@ def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Arr
     _write_actuated(loops, q, x)
     if not loops.m:
         return np.asarray(q[0])
-    closed = polish(loops, search(loops, q))
-    if (
-        not closed_enough(loops, closed.residual, tolerance)[0]
-        or loops.opposed(loops.pairs(loops.tree.poses(closed.q)))[0]
-    ):
-        raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
-    return np.asarray(closed.q[0])
+    for starts in (q, _nudged(loops, q, x)):  # a search that starts at a saddle stays there: step aside
+        found = search(loops, starts)
+        closed = polish(loops, found)
+        opposed = loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
+        good = np.flatnonzero(closed_enough(loops, closed.residual, tolerance) & ~opposed)
+        if good.size:
+            away = loops.tree.difference(q, closed.q[good]) / loops.column_scale
+            return np.asarray(closed.q[good[int(np.argmin(np.abs(away).max(axis=1)))]])
+    raise open_message(loops, _smallest(residual_of(loops, found)), f"at the actuated coordinates {x.tolist()}")
+
+
+def _nudged(loops: Loops, q: Array, x: Array) -> Array:
+    """Return starts (k, nq) about q (1, nq)."""
+    rng = np.random.default_rng(0)
+    tangent = _NUDGE * rng.uniform(-1.0, 1.0, (_NUDGES, loops.tree.nv)) * loops.column_scale
+    starts = loops.tree.integrate(np.repeat(q, _NUDGES, axis=0), tangent)
+    _write_actuated(loops, starts, x)
+    return starts
+
+
+def _actuated_at(loops: Loops, q: Array, x: Array) -> Array:
+    """Return the actuated coordinates (na,) of q (1, nq); unbounded joints count from the turn nearest to x."""
+    at = np.array([loops.tree.coordinate(q, int(k))[0] for k in loops.actuated])
+    turn = 2.0 * np.pi * np.array([loops.tree.is_cyclic(int(k)) for k in loops.actuated], dtype=np.float64)
+    return np.asarray(at + turn * np.round((x - at) / (2.0 * np.pi)))
 
 
 def _closed_from_starts(
@@ -255,12 +287,16 @@ def _closed_from_starts(
     _write_actuated(loops, q, x)
     if not loops.m:
         return q[:1], np.zeros(0)
-    closed = polish(loops, search(loops, q))
-    pairs = loops.pairs(loops.tree.poses(closed.q))
-    good = closed_enough(loops, closed.residual, tolerance) & ~loops.opposed(pairs)
-    residual = loops.residual(pairs)
-    best = int(np.argmin(np.abs(residual).max(axis=1)))
-    return closed.q[good], residual[best]
+    found = search(loops, q)
+    closed = polish(loops, found)
+    good = closed_enough(loops, closed.residual, tolerance)
+    good &= ~loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
+    return closed.q[good], _smallest(residual_of(loops, found))
+
+
+def _smallest(residual: Array) -> Array:
+    """Return the residual (m,) of the best of several configurations (k, m)."""
+    return np.asarray(residual[int(np.argmin(np.linalg.norm(residual, axis=1)))])
 
 
 def _same_pose(loops: Loops, poses: object, other: Array) -> bool:

@@ -168,7 +168,7 @@ def _walk(chain: ClosedChain, loops: Loops, q: Array, rng: np.random.Generator, 
             ok &= closed_enough(loops, closed.residual, 1e-12) & (closed.correction < 0.4 * np.maximum(moved, 0.1))
             trial = closed.q
         N_new, sigma_new, sign_new = _complement(loops, trial)
-        ok &= (sign_new == sign) & (sigma_new > _REGULAR)
+        ok &= (sign_new == sign).all(axis=1) & (sigma_new > _REGULAR)
         q, N = np.where(ok[:, None], trial, q), np.where(ok[:, None, None], N_new, N)
         kept.append((q[ok], N[ok]))
     return np.concatenate([k[0] for k in kept]), np.concatenate([k[1] for k in kept])
@@ -189,11 +189,11 @@ def _complement(loops: Loops, q: Array) -> tuple[Array, Array, Array]:
     N = np.zeros((n, loops.tree.nv, loops.actuated.size))
     N[:, loops.actuated, np.arange(loops.actuated.size)] = 1.0
     if not loops.m:
-        return N, np.ones(n), np.ones(n)
+        return N, np.ones(n), np.ones((n, 0))
     poses = loops.tree.poses(q)
-    J = loops.jacobian(poses, loops.pairs(poses))
-    passive = loops.passive_map(J)
-    block = -np.matmul(passive.X, np.matmul(loops.reduce, J[:, :, loops.actuated]))
+    blocks = loops.blocks(poses, loops.pairs(poses))
+    passive = loops.passive_map(blocks)
+    block = passive.complement(blocks)
     N[:, loops.passive] = np.where(np.isfinite(block), block, 0.0)
     return N, passive.sigma, passive.sign
 
