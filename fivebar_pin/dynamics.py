@@ -22,7 +22,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _bodies
-from fivebar_pin._arrays import Array, checked, cross, frozen
+from fivebar_pin._arrays import Array, checked, cross, frozen, numeric
 from fivebar_pin._loops import loops_of
 from fivebar_pin._reactions import Reactions, reactions
 from fivebar_pin.chain import ClosedChain
@@ -87,7 +87,7 @@ class Loads:
 
     @cached_property
     def kinetic_energy(self) -> Array:
-        """Kinetic energy (n,) [J]."""
+        """Kinetic energy of the bodies, without that of the rotors (armature) (n,) [J]."""
         rates = self.reactions.bodies
         return frozen(0.5 * np.sum(rates.twist * rates.momentum, axis=(1, 2)))
 
@@ -100,14 +100,15 @@ class Loads:
     def power_residual(self) -> float:
         """Return the largest mismatch between the power of the motors and the rate of energy, relative [-].
 
-        The rate of energy is summed body by body (Newton and Euler), the torque comes from Pinocchio. Friction and
-        external forces are accounted for.
+        The rate of energy is summed body by body (Newton and Euler), the torque comes from Pinocchio. Friction,
+        rotors (armature) and external forces are accounted for.
         """
         r = self.reactions
         va = self.trajectory.v[:, self.chain.actuated_index]
         supplied = self.torque * va
         lost = friction_torque(self.chain, self.trajectory.v) * self.trajectory.v
         rate = np.sum((r.bodies.rate - r.gravity - r.external) * r.bodies.twist, axis=2)
+        lost = lost + np.array(self.chain.model.armature) * self.trajectory.a * self.trajectory.v
         mismatch = np.abs(supplied.sum(axis=1) - lost.sum(axis=1) - rate.sum(axis=1))
         scale = np.abs(supplied).sum(axis=1) + np.abs(rate).sum(axis=1)
         return float(np.max(mismatch) / max(float(np.max(scale)), 1e-300))
@@ -233,8 +234,9 @@ def _external(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] | None, 
     for name, wrench in (external or {}).items():
         if name not in names:
             raise UnknownNameError("frame of an external force", name, names)
-        w = np.asarray(wrench, dtype=np.float64)
-        out[name] = checked(f"external[{name!r}]", np.broadcast_to(w, (n, 6)) if w.ndim == 1 else w, (n, 6))
+        label = f"external[{name!r}]"
+        w = numeric(label, wrench)
+        out[name] = np.broadcast_to(checked(label, w, (6,)), (n, 6)) if w.ndim == 1 else checked(label, w, (n, 6))
     return out
 
 
