@@ -138,7 +138,7 @@ class _Coefficients:
     a5: float
     K: CArray  # offsets over link length, conjugated (4, 1)
     mK: CArray  # m_i times offset over link length (4, 1)
-    first: CArray  # first moment per link vector (4,): m c = first @ b + m_fixed
+    first: CArray  # first moment per link vector (4, 1): m c = sum(first * b) + m_fixed
     m_fixed: float  # (m3 + m4) a5 [kg m]
     masses: list[float]
     inertias: Array  # (4, 1)
@@ -149,7 +149,7 @@ class _Coefficients:
     def of(cls, linkage: FiveBar, gravity: Array) -> _Coefficients:
         m, a5 = linkage.masses, float(linkage.lengths[4])
         K = linkage.offsets / linkage.lengths[:4]
-        first = m * K + np.array([m[1], 0.0, 0.0, m[2]])
+        first = (m * K + np.array([m[1], 0.0, 0.0, m[2]]))[:, None]
         fixed = float(m[2] + m[3]) * a5
         mass, I = float(m.sum()), linkage.inertias[:, None]
         return cls(a5, K.conj()[:, None], (m * K)[:, None], first, fixed, m.tolist(), I, mass, gravity.tolist())
@@ -184,7 +184,8 @@ def _load(k: _Coefficients, b: CArray, X: Array, out: _Rows, s: slice) -> None:
     np.subtract(n[3], turn[1], out=tau[1])
     gx, gy, gz = k.gravity
     com, force, moment = out.com[:, s], out.force[:, s], out.moment[:, s]
-    centre, pull = k.first @ b, k.first @ e
+    # not first @ b: on a busy machine threaded BLAS makes four rows wait for a core
+    centre, pull = (k.first * b).sum(axis=0), (k.first * e).sum(axis=0)
     centre += k.m_fixed
     np.divide(centre.real, k.mass, out=com[0])
     np.divide(centre.imag, k.mass, out=com[1])
