@@ -133,6 +133,11 @@ class ClosedChain:
         return frozen([I.toDynamicParameters() for I in list(self.model.inertias)[1:]])
 
     @cached_property
+    def references(self) -> dict[str, Array]:
+        """Named configurations that came with the model (nq,)."""
+        return {entry.key(): frozen(entry.data()) for entry in self.model.referenceConfigurations}
+
+    @cached_property
     def length(self) -> float:
         """Characteristic length [m]: the mean distance between neighbouring joints, closures included."""
         model = self.model

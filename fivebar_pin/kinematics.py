@@ -10,6 +10,7 @@ N is the natural orthogonal complement written in the joint coordinates of the t
 
 from __future__ import annotations
 
+import contextlib
 from typing import Literal
 
 import numpy as np
@@ -48,7 +49,7 @@ def assemble(
         q_actuated: actuated coordinates (na,) or (n, na), order of `chain.actuated` [rad or m].
         near: a configuration (nq,). When it is itself closed, its assembly mode is followed from there along the
             straight line of actuated coordinates; otherwise a damped, step-limited search starts at it.
-            Without it the neutral and then random configurations are tried.
+            Without it the model's named configurations (`chain.references`), the neutral and random ones are tried.
         starts: number of random starts when `near` is not given.
         seed: of the random starts.
         tolerance: closure residual to reach [m or rad; relative to the chain's length above 1 m].
@@ -69,6 +70,9 @@ def assemble(
     x = checked("q_actuated", x, (chain.na,))
     if near is not None:
         return _assemble_near(loops, x, checked("near", near, (chain.nq,)), tolerance)
+    for reference in chain.references.values():
+        with contextlib.suppress(AssemblyError, SingularityError):
+            return _assemble_near(loops, x, reference, tolerance)
     q, residual = _closed_from_starts(chain, loops, x, starts, seed, tolerance)
     if not q.shape[0]:
         raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")

@@ -64,9 +64,8 @@ def _standing(chain: ClosedChain) -> np.ndarray:
 
     from fivebar_pin._loops import loops_of
 
-    references = dict(chain.model.referenceConfigurations)
     loops = loops_of(chain)
-    for q in [*references.values(), pin.neutral(chain.model)]:
+    for q in [*chain.references.values(), pin.neutral(chain.model)]:
         at = np.array([loops.tree.coordinate(q[None], int(k))[0] for k in chain.actuated_index])
         try:
             return assemble(chain, at, q)
