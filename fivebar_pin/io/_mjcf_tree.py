@@ -152,12 +152,12 @@ class BodyTree:
         data = {"effort": [UNLIMITED], "velocity": [UNLIMITED], "lower": [-UNLIMITED], "upper": [UNLIMITED]}
         if self.limited(element, "limited", "range", where):
             scale = reader.angle(1.0) if kind == "revolute" else 1.0
-            low, high = reader.numbers(element, "range", 2, where, None)
+            low, high = reader.numbers(element, "range", 2, where, None, bound=UNLIMITED)
             if low > high:
                 raise reader.fail(where, f"range {low!r} {high!r} is upside down")
             data["lower"], data["upper"] = [low * scale], [high * scale]
         if self.limited(element, "actuatorfrclimited", "actuatorfrcrange", where):
-            low, high = reader.numbers(element, "actuatorfrcrange", 2, where, None)
+            low, high = reader.numbers(element, "actuatorfrcrange", 2, where, None, bound=UNLIMITED)
             data["effort"], data["effort_lower"] = [high], [low]
         return data
 
@@ -194,9 +194,12 @@ class BodyTree:
         self.sites[name] = self.frame(name, link, M)
 
     def frame(self, name: str, link: str, M: Array) -> str:
-        """Add a massless link fixed to another; return its name. The world's own frame is there already."""
-        if name == UNIVERSE and link == WORLD and np.array_equal(M, np.eye(4)):
-            return UNIVERSE
+        """Add a massless link fixed to another; return its name.
+
+        A link's own frame, and the world's, are there already and are not added again.
+        """
+        if np.array_equal(M, np.eye(4)) and (name == link or (name, link) == (UNIVERSE, WORLD)):
+            return name
         new = self.new_link(name)
         joint = self.free_joint_name(f"{new}_joint")
         self.links[new] = LinkEntry(new)

@@ -8,7 +8,6 @@ Ours, written only when needed: ``axis`` and ``closure_name`` (one entry per clo
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._files import read_bounded
+from fivebar_pin.io._xml import HUGE, UNLIMITED
 
 __all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "Sidecar", "dump_sidecar", "read_sidecar"]
 
@@ -204,7 +204,7 @@ class _Check:
             for word, numbers in self.mapping(where, entries).items():
                 if word not in DATA_WORDS:
                     raise self.fail(where, str(UnknownNameError("joint data", word, DATA_WORDS)))
-                result[joint][word] = self.numbers(f"{where}, {word}", numbers)
+                result[joint][word] = self.numbers(f"{where}, {word}", numbers, bound=UNLIMITED)
         return result
 
     def configurations(self, value: object) -> dict[str, list[float]]:
@@ -232,12 +232,12 @@ class _Check:
                 raise self.fail(key, f"{entry!r} must be a name (text); put it in quotes")
         return entries
 
-    def numbers(self, key: str, value: object, count: int | None = None) -> list[float]:
+    def numbers(self, key: str, value: object, count: int | None = None, *, bound: float = HUGE) -> list[float]:
         result = []
         for entry in self.sequence(key, value, count):
             number = _number(entry)
-            if number is None or not math.isfinite(number):
-                raise self.fail(key, f"{str(entry)[:40]!r} must be a finite number")
+            if number is None or not abs(number) <= bound:
+                raise self.fail(key, f"{str(entry)[:40]!r} must be a finite number of sensible size")
             result.append(number)
         return result
 

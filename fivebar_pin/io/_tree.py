@@ -9,11 +9,9 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
+from fivebar_pin.io._xml import UNLIMITED
 
 __all__ = ["UNIVERSE", "UNLIMITED", "JointEntry", "LinkEntry", "TreeEntry", "matrix_to_rpy", "rpy_to_matrix"]
-
-UNLIMITED = float(np.finfo(np.float64).max)
-"""What Pinocchio writes for a limit that is none."""
 
 
 UNIVERSE = "universe"

@@ -183,12 +183,12 @@ def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: 
             raise reader.fail(where, "needs <limit lower= upper= effort= velocity=>")
         return {**data, "effort": [UNLIMITED], "velocity": [UNLIMITED]}
     for word in ("effort", "velocity"):
-        data[word] = reader.numbers(limit, word, 1, where, None)
+        data[word] = reader.numbers(limit, word, 1, where, None, bound=UNLIMITED)
         if data[word][0] < 0.0:
             raise reader.fail(where, f"{word} limit = {data[word][0]!r} must not be negative")
     if kind != "continuous":
-        data["lower"] = reader.numbers(limit, "lower", 1, where, [0.0])
-        data["upper"] = reader.numbers(limit, "upper", 1, where, [0.0])
+        data["lower"] = reader.numbers(limit, "lower", 1, where, [0.0], bound=UNLIMITED)
+        data["upper"] = reader.numbers(limit, "upper", 1, where, [0.0], bound=UNLIMITED)
         if data["lower"][0] > data["upper"][0]:
             raise reader.fail(where, f"lower limit {data['lower'][0]!r} is above upper {data['upper'][0]!r}")
     return data

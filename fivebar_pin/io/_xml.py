@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import difflib
-import math
 import re
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._files import MAX_BYTES, read_bounded
 
-__all__ = ["Reader", "parse_xml"]
+__all__ = ["HUGE", "UNLIMITED", "Reader", "parse_xml"]
 
 MAX_DEPTH = 200
 MAX_ELEMENTS = 200_000
+
+HUGE = 1e30
+"""Beyond any length, mass or inertia; products of numbers below it do not overflow."""
+UNLIMITED = sys.float_info.max
+"""What Pinocchio writes for a limit that is none."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -80,9 +85,16 @@ class Reader:
         return value
 
     def numbers(
-        self, element: ElementTree.Element | None, attribute: str, count: int, where: str, default: list[float] | None
+        self,
+        element: ElementTree.Element | None,
+        attribute: str,
+        count: int,
+        where: str,
+        default: list[float] | None,
+        *,
+        bound: float = HUGE,
     ) -> list[float]:
-        """Return `count` finite numbers; `default` (None: required) stands for an absent attribute."""
+        """Return `count` numbers, at most `bound` in size; `default` (None: required) is for an absent attribute."""
         text = None if element is None else element.get(attribute)
         if text is None:
             if default is None:
@@ -91,14 +103,14 @@ class Reader:
         words = text.split()
         if len(words) != count:
             raise self.fail(where, f"{attribute} = {text!r} must be {count} number(s)")
-        return [self.number(word, attribute, where) for word in words]
+        return [self.number(word, attribute, where, bound=bound) for word in words]
 
-    def number(self, word: str, attribute: str, where: str) -> float:
-        """Return one finite number."""
+    def number(self, word: str, attribute: str, where: str, *, bound: float = HUGE) -> float:
+        """Return one finite number, at most `bound` in size."""
         if not _NUMBER.fullmatch(word):
             raise self.fail(where, f"{attribute} holds {word[:40]!r}, which is not a finite number")
         value = float(word)
-        if not math.isfinite(value):
+        if not abs(value) <= bound:
             raise self.fail(where, f"{attribute} holds {word[:40]!r}, which is out of range")
         return value
 
