@@ -104,7 +104,8 @@ class Diagnosis:
         actuation: whether they determine the motion in general.
         undetermined: joints that can still move, in general, when the actuated ones are held.
         excess: number of actuated joints that follow from the others, in general.
-        actuated_sets: sets of joints that determine the motion, the best conditioned first (at most 12).
+        actuated_sets: joints that determine the motion here (nearby when here is singular), the best conditioned
+            first (at most 12).
         sigma: distance to the type 2 singularity: smallest singular value of the scaled passive columns here, zero
             where the actuated joints do not determine the motion [-].
         amplification: largest passive speed per unit actuated speed here, scaled [-]; infinite at the singularity.

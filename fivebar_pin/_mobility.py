@@ -105,7 +105,7 @@ def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array
 
 
 def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) -> Site:
-    """Walk away from a closed configuration along what the closures allow; return the most regular site met.
+    """Walk away from a closed configuration along what the closures allow; return the most regular site met there.
 
     The rank of the closures is highest at almost every configuration and drops at singular ones, where branches of
     different character may meet: those that the actuated joints can drive come first.
@@ -125,7 +125,7 @@ def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) ->
         here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(_WALKERS)]
         for candidate in here:
             new = _score(loops, candidate)
-            if new[:2] > score[:2] or (new[:2] == score[:2] and new[2] > 1.5 * score[2]):
+            if candidate is not site and (new > score or (best is site and new[:2] == score[:2])):
                 best, score = candidate, new
     return best
 

@@ -53,7 +53,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         findings.append(Finding("warning", _jump(chain, here, generic, "the configuration nearest to the neutral one")))
         here, gap = generic, float(_mobility.gap(loops, generic.q[None])[0])
     actuation, undetermined, excess = _actuation(chain, generic)
-    sets = _mobility.determining_sets(chain, generic, _SETS)
+    sets = _mobility.determining_sets(chain, generic if here.rank < generic.rank else here, _SETS)
     redundant = _redundant_rows(loops, here, generic)
     sigma = _mobility.passive_sigma(loops, here.J, loops.actuated)
     joints, closures = _determinate(chain, here.q)
