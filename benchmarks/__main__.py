@@ -7,22 +7,30 @@ import argparse
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import ladder, roads
+from benchmarks import ladder, mechanisms, roads
+
+PARTS = ("roads", "mechanisms", "ladder", "assemblies")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--samples", type=int, nargs="+", default=[1, 100, 1000, 100000])
-    parser.add_argument("--which", nargs="+", choices=("roads", "ladder"), default=["roads", "ladder"])
+    parser.add_argument("--which", nargs="+", choices=PARTS, default=PARTS)
+    parser.add_argument("--assemblies", type=int, default=10000, help="random assemblies in all [10000]")
     chosen = parser.parse_args()
     console = Console(width=150)
     if "roads" in chosen.which:
         rows = roads.rows(tuple(chosen.samples))
         _show(console, "Five-bar, torque and shaking wrench, per sample", roads.HEADINGS, rows)
+    if "mechanisms" in chosen.which:
+        _show(console, "Shipped mechanisms, torque and shaking wrench", mechanisms.HEADINGS, mechanisms.rows())
     if "ladder" in chosen.which:
         rows, side, stacked = ladder.rows()
         _show(console, "N five-bars, torque and shaking wrench, per sample", ladder.HEADINGS, rows)
         console.print(f"cost per sample grows as N^{side:.2f} side by side, N^{stacked:.2f} stacked")
+    if "assemblies" in chosen.which:
+        rows = mechanisms.assemblies(chosen.assemblies)
+        _show(console, "Random assemblies", mechanisms.ASSEMBLIES, rows)
 
 
 def _show(console: Console, title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

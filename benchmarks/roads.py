@@ -26,7 +26,7 @@ def rows(samples: tuple[int, ...]) -> list[tuple[str, ...]]:
     """Measure torque and shaking wrench from the motion of the motors, microseconds per sample."""
     linkage = paper.table_1("I", "unbalanced")
     chain = linkage.chain()
-    prepared = handwritten.prepare(chain)
+    prepared = handwritten.prepare(chain, linkage.configuration(0.5, 1.5, mode=paper.AssemblyMode.LEFT))
     out = []
     for n in samples:
         motion = paper.default_motion(samples=max(n, 2))
