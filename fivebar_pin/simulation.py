@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin._energy import EnergyBalance, energy_balance
-from fivebar_pin._integration import Inputs, State, run
+from fivebar_pin._integration import run
 from fivebar_pin._manifold import Point
+from fivebar_pin._motion_in_chart import Inputs, State
 from fivebar_pin._springs import JointSpring, Spring
 from fivebar_pin._system import System, Wrench, check_frame, checked_wrench
 from fivebar_pin.chain import ClosedChain
@@ -87,8 +88,8 @@ def simulate(
     springs: Iterable[Spring | JointSpring] = (),
     external: Mapping[str, Wrench] | None = None,
     initial: Literal["check", "project"] = "check",
-    rtol: float = 1e-10,
-    atol: float = 1e-12,
+    rtol: float = 1e-11,
+    atol: float = 1e-13,
     max_steps: int = 1_000_000,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
@@ -105,8 +106,8 @@ def simulate(
             [N m] in world axes at the frame's origin.
         initial: "check" refuses a state that does not keep the loops closed; "project" moves it to a near one that
             does (the velocity as a sudden closing of the loops would leave it).
-        rtol, atol: error allowed per step, relative and absolute, of the independent coordinates [rad, or chain
-            lengths] and their rates.
+        rtol, atol: error allowed per step: rtol + atol of the independent coordinates [rad, or chain lengths], and
+            rtol |rate| + atol of their rates.
         max_steps: bound on the number of steps.
         progress: called with the done fraction of the time span, 0 to 1, after every step.
 
