@@ -279,7 +279,7 @@ def test_arguments_stand_in_for_a_sidecar(tmp_path: Path) -> None:
 
 def test_the_sidecars_joint_types_are_taken(tmp_path: Path) -> None:
     """CARDAN gives two hinges, SPHERICAL a ball, FIXED takes the joint out of the coordinates."""
-    kinds = {"CARDAN": 3, "spherical": 5, "FIXED": 1, "TRANSLATION": 4, "SPHERICAL_ZYX": 4}
+    kinds = {"CARDAN": 3, "ujoint_zy": 3, "spherical": 5, "FIXED": 1, "TRANSLATION": 4, "SPHERICAL_ZYX": 4}
     for word, nq in kinds.items():
         write(
             tmp_path,
@@ -290,6 +290,37 @@ def test_the_sidecars_joint_types_are_taken(tmp_path: Path) -> None:
         np.testing.assert_allclose(chain.mass, 2.0)
     write(tmp_path, sidecar=SIDECAR + "joint_name: [j2]\njoint_type: [CARDAN]")
     assert io.load(tmp_path).joints == ("j1", "j2_X", "j2_Y")
+    write(tmp_path, sidecar=SIDECAR + "joint_name: [j2]\njoint_type: [UJOINT_ZY]")
+    chain = io.load(tmp_path)
+    assert chain.joints == ("j1", "j2_Z", "j2_Y")
+    assert [j.shortname() for j in chain.model.joints][2:] == ["JointModelRZ", "JointModelRY"]
+    write(tmp_path, URDF.replace('name="j_tip"', 'name="j2_X"'), SIDECAR + "joint_name: [j2]\njoint_type: [CARDAN]")
+    with pytest.raises(FileFormatError, match="would make a second j2_X"):
+        io.load(tmp_path)
+
+
+def test_a_limit_without_bounds_bounds_nothing(tmp_path: Path) -> None:
+    """CAD exporters write <limit effort velocity> for a joint that turns freely; a closure may name a joint's frame."""
+    write(tmp_path, URDF.replace('lower="-1" upper="1"', ""), SIDECAR.replace("[tip, peg]", "[j2, base]"))
+    model = io.load(tmp_path).model
+    assert model.upperPositionLimit[0] > 1e300
+    assert model.lowerPositionLimit[0] < -1e300
+    assert model.upperEffortLimit[0] == 2.0
+
+
+def test_a_mesh_is_named_but_not_needed(tmp_path: Path) -> None:
+    """A mesh that is nowhere keeps its name; one that is found is named by its path, and saved relative to it."""
+    box = '<box size="0.1 0.1 0.1"/>'
+    write(tmp_path, URDF.replace(box, '<mesh filename="package:///one.stl" scale="1 2 3"/>'))
+    assert io.load(tmp_path).visuals[0].mesh == "package:///one.stl"
+    (tmp_path / "one.stl").touch()
+    chain = io.load(tmp_path)
+    assert chain.visuals[0].mesh == str(tmp_path / "one.stl")
+    assert chain.visuals[0].size == (1.0, 2.0, 3.0)
+    urdf, _, xml = io.save(chain, tmp_path, name="again")
+    assert 'filename="one.stl"' in urdf.read_text()
+    assert 'file="one.stl"' in xml.read_text()
+    assert io.load(xml).visuals[0].mesh == str(tmp_path / "one.stl")
 
 
 def test_nothing_is_overwritten_unless_told(tmp_path: Path) -> None:
@@ -366,9 +397,9 @@ def test_names_that_xml_and_yaml_must_quote_come_back(tmp_path: Path) -> None:
 
 
 PIECES = (
-    "", "nan", "inf", "-1", "0", "1e400", "1e308", "-1e308", "1e29", "1e-320", "a", "<", ">", '"', "/>", "<joint", "one",
-    "base", "j1", "\0", "&amp;", "&x;", "[", "]", "{", "}", ": ", "- ", "*a", "&a ", "'", "\n", "  ", "\t", "!!int", "~",
-    "é", "3d", "revolute", "fixed", "ball", "free", "SPHERICAL", "universe",
+    "", "nan", "inf", "-1", "0", "1e400", "1e308", "-1e308", "1e29", "1e-320", "a", "<", ">", '"', "/>", "<joint",
+    "one", "base", "j1", "\0", "&amp;", "&x;", "[", "]", "{", "}", ": ", "- ", "*a", "&a ", "'", "\n", "  ", "\t",
+    "!!int", "~", "é", "3d", "revolute", "fixed", "ball", "free", "SPHERICAL", "universe",
 )  # fmt: skip
 
 MORE = """gravity: [0, 0, -1]

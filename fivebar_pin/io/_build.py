@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import FileFormatError, UnknownNameError
-from fivebar_pin.io._sidecar import DATA_FIELDS, Sidecar
+from fivebar_pin.io._sidecar import DATA_FIELDS, UNIVERSAL, Sidecar
 from fivebar_pin.io._tree import UNLIMITED, JointEntry, TreeEntry
 
 __all__ = ["bare_inertia", "build_model", "joint_model", "joint_order", "set_default_limits"]
@@ -72,8 +72,8 @@ def _with_types(tree: TreeEntry, types: Mapping[str, str], beside: Path) -> Tree
         joint = joints[name]
         if word == "FIXED":
             joints[name] = replace(joint, kind="fixed", data={})
-        elif word == "CARDAN":
-            joints.update(_cardan(joints.pop(name), tree, beside))
+        elif word in UNIVERSAL:
+            joints.update(_universal(joints.pop(name), UNIVERSAL[word], tree, beside))
         else:
             joints[name] = replace(joint, kind=word, data={})
     links = {**tree.links}
@@ -84,15 +84,18 @@ def _with_types(tree: TreeEntry, types: Mapping[str, str], beside: Path) -> Tree
     return replace(tree, joints=joints, links=links)
 
 
-def _cardan(joint: JointEntry, tree: TreeEntry, beside: Path) -> dict[str, JointEntry]:
-    """Return two revolute joints, about x then y of the joint's axes, with a massless cross between them."""
-    x, y, cross = f"{joint.name}_X", f"{joint.name}_Y", f"{joint.name}_cross"
-    if {x, y} & set(tree.joints) or cross in tree.links:
-        raise FileFormatError(beside, f"joint_type: CARDAN on {joint.name!r} would make a second {x}, {y} or {cross}")
+def _universal(joint: JointEntry, axes: str, tree: TreeEntry, beside: Path) -> dict[str, JointEntry]:
+    """Return two hinges, about two axes of the joint's own frame, with a massless cross between them."""
+    first, second = (f"{joint.name}_{letter}" for letter in axes)
+    cross = f"{joint.name}_cross"
+    if {first, second} & set(tree.joints) or cross in tree.links:
+        problem = f"a universal joint for {joint.name!r} would make a second {first}, {second} or {cross}"
+        raise FileFormatError(beside, f"joint_type: {problem}")
+    one, two = (np.eye(3)["XYZ".index(letter)] for letter in axes)
     data = {"lower": [-UNLIMITED], "upper": [UNLIMITED]}
     return {
-        x: replace(joint, name=x, kind="revolute", child=cross, axis=np.eye(3)[0], data=data),
-        y: replace(joint, name=y, kind="revolute", parent=cross, placement=np.eye(4), axis=np.eye(3)[1], data=data),
+        first: replace(joint, name=first, kind="revolute", child=cross, axis=one, data=data),
+        second: replace(joint, name=second, kind="revolute", parent=cross, placement=np.eye(4), axis=two, data=data),
     }
 
 

@@ -18,12 +18,18 @@ from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameErro
 from fivebar_pin.io._files import read_bounded
 from fivebar_pin.io._xml import HUGE, UNLIMITED
 
-__all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "Sidecar", "dump_sidecar", "read_sidecar"]
+__all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "UNIVERSAL", "Sidecar", "dump_sidecar", "read_sidecar"]
 
 MAX_SIDECAR_BYTES = 1024 * 1024
 MAX_DEPTH = 20
 
-JOINT_WORDS = ("SPHERICAL", "SPHERICAL_ZYX", "TRANSLATION", "CARDAN", "FIXED")
+UNIVERSAL = {
+    "CARDAN": "XY",
+    **{f"UJOINT_{a}{b}": a + b for a in "XYZ" for b in "XYZ" if a != b},
+}
+"""Joints of two hinges, and the axes of the joint's own frame that these turn about, one after the other."""
+
+JOINT_WORDS = ("SPHERICAL", "SPHERICAL_ZYX", "TRANSLATION", "FIXED", *UNIVERSAL)
 """Joint types a sidecar can give to a joint of the URDF."""
 
 DATA_FIELDS = {

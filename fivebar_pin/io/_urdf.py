@@ -169,6 +169,7 @@ def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -
 
 
 def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> dict[str, list[float]]:
+    """Return limits and losses; a <limit> with neither lower nor upper bounds nothing, with one the other is zero."""
     if kind not in ("revolute", "continuous", "prismatic"):
         return {}
     limit, dynamics = reader.only(element, "limit", where), reader.only(element, "dynamics", where)
@@ -186,7 +187,7 @@ def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: 
         data[word] = reader.numbers(limit, word, 1, where, None, bound=UNLIMITED)
         if data[word][0] < 0.0:
             raise reader.fail(where, f"{word} limit = {data[word][0]!r} must not be negative")
-    if kind != "continuous":
+    if kind != "continuous" and ("lower" in limit.attrib or "upper" in limit.attrib):
         data["lower"] = reader.numbers(limit, "lower", 1, where, [0.0], bound=UNLIMITED)
         data["upper"] = reader.numbers(limit, "upper", 1, where, [0.0], bound=UNLIMITED)
         if data["lower"][0] > data["upper"][0]:
@@ -240,7 +241,7 @@ def _visual(reader: Reader, element: ElementTree.Element, link: str, colours: Co
 def _mesh_file(urdf: Path, filename: str) -> str:
     """Return where the mesh is when it can be found, else what the file calls it."""
     if filename.startswith("package://"):
-        rest = filename[len("package://") :]
+        rest = filename[len("package://") :].lstrip("/")
         candidates = [folder / rest for folder in urdf.resolve().parents]
     elif filename.startswith("file://"):
         candidates = [Path(filename[len("file://") :])]

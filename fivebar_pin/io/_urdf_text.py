@@ -39,7 +39,14 @@ def urdf_and_sidecar(chain: ClosedChain, folder: Path) -> tuple[str, Sidecar]:
 
 
 def numbers(values: Iterable[float] | Array) -> str:
-    """Return numbers as text that reads back exactly, -0 as 0."""
+    """Return numbers as text that reads back exactly, -0 as 0.
+
+    Raises:
+        InvalidInputError: one of them is not finite.
+    """
+    values = [float(x) for x in values]
+    if not all(np.isfinite(values)):
+        raise InvalidInputError("number to write", values, "must be finite")
     return " ".join(repr(float(x) + 0.0) for x in values)
 
 
