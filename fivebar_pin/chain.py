@@ -77,7 +77,6 @@ class ClosedChain:
         object.__setattr__(self, "visuals", tuple(self.visuals))
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
         _check_tree(self.model)
-        _check_order(self.model)
         _check_closures(self.model, self.closures)
         _check_actuated(self.model, self.actuated)
         frames = [f.name for f in self.model.frames]
@@ -186,19 +185,6 @@ def _check_tree(model: pin.Model) -> None:
             raise InvalidInputError(f"inertia of joint {name}", "nan", "must be finite")
         if inertia.mass < 0.0:
             raise InvalidInputError(f"mass of the body of joint {name}", inertia.mass, "must not be negative [kg]")
-
-
-def _check_order(model: pin.Model) -> None:
-    """Refuse joints that do not go depth first: Pinocchio's mass matrix is silently wrong for them."""
-    for j in range(1, model.njoints):
-        below = list(model.subtrees[j])
-        if below != list(range(j, j + len(below))):
-            raise InvalidInputError(
-                "order of the joints",
-                list(model.names)[1:],
-                f"the joints carried by {model.names[j]!r} do not follow it in one piece",
-                "Add the joints depth first: one branch to its end before the next begins.",
-            )
 
 
 def _check_closures(model: pin.Model, closures: tuple[Closure, ...]) -> None:
