@@ -3,6 +3,24 @@
 from __future__ import annotations
 
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
+from fivebar_pin.balancing.design import Certificate, Change, Design
+from fivebar_pin.balancing.problem import BalanceProblem, balance, balance_problem
+from fivebar_pin.balancing.regions import Ball, Box, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
 
-__all__ = ["QUANTITIES", "BalanceConditions", "Regressor", "balance_conditions", "regressor"]
+__all__ = [
+    "QUANTITIES",
+    "BalanceConditions",
+    "BalanceProblem",
+    "Ball",
+    "Box",
+    "Certificate",
+    "Change",
+    "Design",
+    "Ellipsoid",
+    "Regressor",
+    "balance",
+    "balance_conditions",
+    "balance_problem",
+    "regressor",
+]

@@ -21,6 +21,8 @@ SpaceName = Literal["auto", "planar", "spatial"]
 
 _SEEDS = 48
 _STEP = 0.35  # of a random walk [rad, or chain lengths]
+_CAREFUL = 0.2  # step of a careful walk over the smallest singular value [rad, or chain lengths]
+_LONG = 40  # half the steps of a careful walk
 _REGULAR = 1e-3  # scaled smallest singular value of a sample worth keeping [-]
 _WIDE = 50.0  # joint limits beyond this [rad, or chain lengths] do not bound the samples
 
@@ -60,8 +62,8 @@ def random_samples(chain: ClosedChain, count: int, *, near: npt.ArrayLike | None
             raise _too_few(loops, 0, count, good)
     else:
         q = _near(chain, loops, near)
-        walks = 4 + -(-count // _SEEDS)
-    out, N = _walk(chain, loops, q, rng, 2 * walks)
+        walks = _LONG + -(-count // _SEEDS)
+    out, N = _walk(chain, loops, q, rng, 2 * walks, careful=near is not None)
     if out.shape[0] < count:
         raise _too_few(loops, out.shape[0], count, float("nan"))
     pick = rng.permutation(out.shape[0])[: 2 * count]
@@ -149,27 +151,37 @@ def _near(chain: ClosedChain, loops: Loops, near: npt.ArrayLike) -> Array:
     return np.repeat(q, _SEEDS, axis=0)
 
 
-def _walk(chain: ClosedChain, loops: Loops, q: Array, rng: np.random.Generator, steps: int) -> tuple[Array, Array]:
-    """Walk at random from every q (k, nq) without leaving its assembly mode; return all regular stops and their N."""
+def _walk(
+    chain: ClosedChain, loops: Loops, q: Array, rng: np.random.Generator, steps: int, *, careful: bool
+) -> tuple[Array, Array]:
+    """Walk at random from every q (k, nq); return all regular stops and their N.
+
+    A careful walk makes steps so short that the smallest singular value cannot pass through zero on the way: where
+    two branches of a mechanism meet, it does not jump from one to the other.
+    """
     limits = _limits(chain, loops)
     actuated, passive = loops.actuated, loops.passive
     N, sigma, sign = _complement(loops, q)
     kept = [(q[sigma > _REGULAR], N[sigma > _REGULAR])]
+    heading = rng.normal(size=(q.shape[0], actuated.size))
     for _ in range(steps):
-        dx = rng.normal(size=(q.shape[0], actuated.size)) * _STEP * loops.column_scale[actuated]
-        size = np.abs(np.matmul(N, dx[..., None])[..., 0] / loops.column_scale).max(axis=1)
-        dx *= np.minimum(1.0, 2.0 * _STEP / np.maximum(size, 1e-12))[:, None]
-        tangent = np.matmul(N, dx[..., None])[..., 0]
+        tangent = np.matmul(N, (heading * loops.column_scale[actuated])[..., None])[..., 0]
+        size = np.abs(tangent / loops.column_scale).max(axis=1)
+        longest = np.minimum(_STEP, _CAREFUL * sigma) if careful else np.full(q.shape[0], 2.0 * _STEP)
+        tangent *= (rng.uniform(0.3, 1.0, size.size) * longest / np.maximum(size, 1e-12))[:, None]
         trial = loops.tree.integrate(q, tangent)
         ok = _within(loops, trial, limits)
         if loops.m:
             closed = polish(loops, trial)
             moved = np.abs(tangent[:, passive] / loops.column_scale[passive]).max(axis=1, initial=0.0)
-            ok &= closed_enough(loops, closed.residual, 1e-12) & (closed.correction < 0.4 * np.maximum(moved, 0.1))
+            ok &= closed_enough(loops, closed.residual, 1e-12) & (closed.correction < 0.4 * np.maximum(moved, 0.01))
             trial = closed.q
         N_new, sigma_new, sign_new = _complement(loops, trial)
         ok &= (sign_new == sign).all(axis=1) & (sigma_new > _REGULAR)
         q, N = np.where(ok[:, None], trial, q), np.where(ok[:, None, None], N_new, N)
+        sigma = np.where(ok, sigma_new, sigma)
+        heading = np.where(ok[:, None], heading, -heading) + 0.3 * rng.normal(size=heading.shape)
+        heading /= np.linalg.norm(heading, axis=1, keepdims=True)
         kept.append((q[ok], N[ok]))
     return np.concatenate([k[0] for k in kept]), np.concatenate([k[1] for k in kept])
 

@@ -45,6 +45,7 @@ class BalanceConditions:
         rank: number of independent conditions.
         basis: orthonormal rows (rank, nb * width) on the scaled parameters, see `Space.scale`.
         matrix: the same rows on the stacked ten parameters of all bodies (rank, 10 nb), in kg.
+        rows: the reduced form, scaled and with rows of length one (rank, nb * width).
         reduced: reduced row echelon form on the parameters in SI units (rank, nb * width).
         singular_values: of the stacked regressor, scaled, relative to the largest.
         gap: ratio of the last singular value that counts to the first that does not.
@@ -57,6 +58,7 @@ class BalanceConditions:
     rank: int
     basis: Array
     matrix: Array
+    rows: Array
     reduced: Array
     singular_values: Array
     gap: float
@@ -209,6 +211,7 @@ def _decide(chain: ClosedChain, kind: str, space: Space, rows: Array, samples: i
             tolerance=_CLEAR,
         )
     basis = Vt[:rank]
+    echelon = _echelon(basis, space)
     return BalanceConditions(
         chain=chain,
         kind=kind,
@@ -216,7 +219,8 @@ def _decide(chain: ClosedChain, kind: str, space: Space, rows: Array, samples: i
         rank=rank,
         basis=frozen(basis),
         matrix=frozen((basis / space.scale) @ space.selection()),
-        reduced=frozen(_reduced(basis, space)),
+        rows=frozen(echelon / np.linalg.norm(echelon, axis=1, keepdims=True)),
+        reduced=frozen(_readable(echelon, space)),
         singular_values=frozen(relative),
         gap=gap,
         samples=samples,
@@ -238,32 +242,31 @@ def _gap(s: Array) -> tuple[int, float]:
     return rank, float(ratio[rank - 1])
 
 
-def _reduced(basis: Array, space: Space) -> Array:
-    """Return the reduced row echelon form in SI units; inertias and first moments of the later bodies lead."""
+def _echelon(basis: Array, space: Space) -> Array:
+    """Return the scaled reduced row echelon form; inertias and first moments of the later bodies lead."""
     rank, P = basis.shape
     orders = np.tile(space.orders, len(space.bodies))
     preference = sorted(range(P), key=lambda k: (-orders[k], -(k // space.width), k))
     pivots: list[int] = []
     chosen = np.zeros((rank, 0))
     for k in preference:
-        column = basis[:, k]
-        left = column - chosen @ (chosen.T @ column)
-        if np.linalg.norm(left) > 1e-6:
+        left = basis[:, k] - chosen @ (chosen.T @ basis[:, k])
+        if len(pivots) < rank and np.linalg.norm(left) > 1e-6:
             pivots.append(k)
             left -= chosen @ (chosen.T @ left)
             chosen = np.column_stack([chosen, left / np.linalg.norm(left)])
-        if len(pivots) == rank:
-            break
-    if not rank:
-        return np.zeros((0, P))
-    C = np.linalg.solve(basis[:, pivots], basis) / space.scale
-    C = C / C[np.arange(rank), pivots][:, None]
-    for row in C:
-        noise = 1e-9 * np.abs(row * space.scale).max()
-        for k in range(P):
-            row[k] = 0.0 if abs(row[k] * space.scale[k]) < noise else _tidy(float(row[k]))
-    order = np.argsort(pivots)
-    return np.asarray(C[order])
+    return np.asarray(np.linalg.solve(basis[:, pivots], basis)[np.argsort(pivots)])
+
+
+def _readable(echelon: Array, space: Space) -> Array:
+    """Return the form in SI units: leading factor one, noise gone, simple fractions recognised."""
+    out = np.zeros_like(echelon)
+    for row, tidy in zip(echelon, out, strict=True):
+        real = np.abs(row) > 1e-9 * np.abs(row).max()
+        lead = int(np.argmin(np.abs(row - 1.0)))
+        for k in np.flatnonzero(real):
+            tidy[k] = _tidy(float(row[k] / space.scale[k] * space.scale[lead]))
+    return out
 
 
 def _tidy(x: float) -> float:

@@ -1,0 +1,151 @@
+"""The terms of an objective as epigraphs t >= term(design), and bounds on the same terms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.balancing._conic import Block
+from fivebar_pin.balancing._quantities import MEASURES, Rows
+from fivebar_pin.errors import InvalidInputError, UnknownNameError
+
+LINEAR = ("added_mass", "inertia")
+TERMS = (*LINEAR, "distance", *(f"{s}_{m}" for m in MEASURES for s in ("rms", "peak", "mean_square")))
+
+
+def base(term: str) -> str:
+    """Return the term whose epigraph a term uses: a mean square is the square of an rms."""
+    return term.replace("mean_square_", "rms_")
+
+
+def check_terms(names: Mapping[str, object] | tuple[str, ...], what: str) -> None:
+    """Raise for a term that does not exist."""
+    for name in names:
+        if name not in TERMS:
+            raise UnknownNameError(what, name, TERMS)
+
+
+def measure_of(term: str) -> str | None:
+    """Return the quantity along motions that a term needs, or None."""
+    for name in MEASURES:
+        if term.endswith(name):
+            return name
+    return None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Term:
+    """One term as a function of the design variables y: a linear one, or lengths of vectors.
+
+    Attributes:
+        name: base name.
+        vectors: affine vectors (G (d, n), g (d,)) whose longest length is the term; a linear term has one row and
+            may be negative.
+        signed: whether the single row counts with its sign.
+        scale: typical size, in the term's unit.
+    """
+
+    name: str
+    vectors: tuple[tuple[Array, Array], ...]
+    signed: bool
+    scale: float
+
+    def value(self, y: Array) -> float:
+        """Return the term at y (n,)."""
+        if self.signed:
+            G, g = self.vectors[0]
+            return float((G @ y + g)[0])
+        return max(float(np.linalg.norm(G @ y + g)) for G, g in self.vectors)
+
+    def epigraph(self, column: int) -> list[Block]:
+        """Return the cones of scale * y[column] >= term."""
+        n = self.vectors[0][0].shape[1]
+        bound = np.zeros(n)
+        bound[column] = 1.0
+        return self._below(bound, np.zeros(1), f"epigraph of {self.name}")
+
+    def bounded(self, limit: float) -> list[Block]:
+        """Return the cones of term <= limit."""
+        n = self.vectors[0][0].shape[1]
+        return self._below(np.zeros(n), np.array([limit / self.scale]), f"{self.name} <= {limit:g}")
+
+    def _below(self, bound: Array, offset: Array, label: str) -> list[Block]:
+        blocks, flat = [], []
+        for G, g in self.vectors:
+            G, g = G / self.scale, g / self.scale
+            if self.signed:
+                flat.append((bound - G[0], offset - g))
+            elif G.shape[0] == 1:
+                flat += [(bound - G[0], offset - g), (bound + G[0], offset + g)]
+            else:
+                blocks.append(
+                    Block(label, "soc", np.vstack([bound, G]), np.concatenate([offset, g]), first(G.shape[0] + 1))
+                )
+        if flat:
+            blocks.append(
+                Block(
+                    label,
+                    "nonneg",
+                    np.stack([r for r, _ in flat]),
+                    np.concatenate([c for _, c in flat]),
+                    np.ones(len(flat)),
+                )
+            )
+        return blocks
+
+
+def first(size: int) -> Array:
+    """Return the first unit vector."""
+    e = np.zeros(size)
+    e[0] = 1.0
+    return e
+
+
+def linear_term(name: str, row: Array, constant: float, scale: float) -> Term:
+    """Make a term row @ y + constant."""
+    return Term(name, ((row[None], np.array([constant])),), True, scale)
+
+
+def rows_term(name: str, rows: Rows, E: Array, pi0: Array, present: Array) -> Term:
+    """Make the rms or peak of rows over designs pi = E y + pi0 (10 nb,).
+
+    Args:
+        present: parameters (10 nb,) that give the term its scale.
+    """
+    G, g = rows.F @ E, rows.F @ pi0 + rows.f
+    if name.startswith("rms_"):
+        stacked = np.column_stack([G.reshape(-1, G.shape[-1]), g.reshape(-1)]) / np.sqrt(len(g))
+        R = np.asarray(np.linalg.qr(stacked, mode="r"))
+        used = np.abs(R).max(axis=1) > 1e-16 * float(np.abs(R).max(initial=0.0))
+        R = R[used] if used.any() else R[:1]
+        value = rows.rms(present)
+        vectors: tuple[tuple[Array, Array], ...] = ((R[:, :-1], R[:, -1]),)
+    else:
+        value = rows.peak(present)
+        vectors = tuple((G[k, s], g[k, s]) for s in rows.groups for k in range(len(g)))
+    without = float(np.abs(rows.F * np.abs(present)).max(initial=0.0))
+    return Term(name, vectors, False, value if value > 1e-3 * without else (without or 1.0))
+
+
+def torque_limits(limit: npt.ArrayLike, rows: Rows, E: Array, pi0: Array) -> list[Block]:
+    """Return the cones of |torque of every motor| <= its limit; one limit for all motors or one for each."""
+    each = np.broadcast_to(np.asarray(limit, dtype=np.float64), (len(rows.groups),))
+    G, g = rows.F @ E, rows.F @ pi0 + rows.f
+    blocks = []
+    for k, label in enumerate(rows.labels):
+        top = positive_limit(f"peak_torque of {label}", float(each[k]))
+        both = np.concatenate([-G[:, k], G[:, k]]) / top
+        offset = 1.0 - np.r_[g[:, k], -g[:, k]] / top
+        blocks.append(Block(f"peak_torque of {label} <= {top:g}", "nonneg", both, offset, np.ones(offset.size)))
+    return blocks
+
+
+def positive_limit(name: str, limit: float) -> float:
+    """Check a bound on a term."""
+    if not (np.isfinite(limit) and limit > 0.0):
+        raise InvalidInputError(f"limit of {name}", limit, "must be positive and finite")
+    return limit

@@ -1,0 +1,146 @@
+"""Design: what `balance` answers, with everything needed to check it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.balancing._conic import Certificate
+from fivebar_pin.balancing._quantities import Rows
+from fivebar_pin.balancing.conditions import BalanceConditions
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InfeasibleError
+
+__all__ = ["Certificate", "Change", "Design"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Change:
+    """Material added to one body (or removed from it, or the body as redesigned).
+
+    Attributes:
+        body: name of the body's joint.
+        mass: [kg].
+        place: its centre of mass in joint axes (3,) [m]; zero without mass.
+        inertia: about its centre of mass, joint axes (3, 3) [kg m2].
+        parameters: the ten inertial parameters about the joint origin.
+    """
+
+    body: str
+    mass: float
+    place: Array
+    inertia: Array
+    parameters: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design:
+    """A balanced mechanism, optimal for the objective, or the proof that there is none.
+
+    Attributes:
+        status: "optimal" or "infeasible".
+        original: the chain that was to be balanced.
+        kind: what is exact, or None.
+        conditions: the balancing conditions, or None when nothing is exact.
+        objective: weighted sum of the terms.
+        dual_bound: no design within the bounds has a lower objective.
+        terms: value of every term of the objective, in its own unit.
+        parameters: inertial parameters of all bodies (nb, 10); nan when infeasible.
+        added, removed: material per body that may change; for a redesign, `added` holds the new bodies.
+        rows: the quantities along the given motions, for `before` and `after`.
+        certificate: proof of infeasibility, else None.
+    """
+
+    status: str
+    original: ClosedChain
+    kind: str | None
+    conditions: BalanceConditions | None
+    objective: float
+    dual_bound: float
+    terms: dict[str, float]
+    parameters: Array
+    added: tuple[Change, ...] = ()
+    removed: tuple[Change, ...] = ()
+    rows: Mapping[str, Rows] = field(default_factory=dict)
+    certificate: Certificate | None = None
+
+    def __repr__(self) -> str:
+        if not self.feasible:
+            return f"Design({self.original.name!r}, {self.kind}: infeasible; {self.certificate})"
+        return (
+            f"Design({self.original.name!r}, {self.kind}: {self.status}, objective {self.objective:.6g}, "
+            f"gap {self.gap:.1e}, residual {self.residual:.1e})"
+        )
+
+    def __str__(self) -> str:
+        lines = [repr(self)]
+        for sign, changes in (("+", self.added), ("-", self.removed)):
+            for c in changes:
+                if c.mass < 1e-7 * self.original.mass:
+                    continue  # what keeps a body strictly physical
+                place = ", ".join(f"{x:.5g}" for x in c.place)
+                lines.append(f"  {sign} {c.body}: {c.mass:.6g} kg at ({place}) m")
+        if self.feasible:
+            lines += [f"  {k}: {self.before[k]:.5g} -> {self.after[k]:.5g}" for k in self.before]
+        return "\n".join(lines)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether there is a design."""
+        return self.status == "optimal"
+
+    @property
+    def gap(self) -> float:
+        """Difference between the objective and its lower bound."""
+        return self.objective - self.dual_bound
+
+    @cached_property
+    def before(self) -> dict[str, float]:
+        """Rms and peak of each quantity of the original over the given motions, "rms_torque" and so on."""
+        return self._measured(self.original.inertial_parameters)
+
+    @cached_property
+    def after(self) -> dict[str, float]:
+        """The same of the design."""
+        return self._measured(self.parameters)
+
+    def _measured(self, pi: Array) -> dict[str, float]:
+        return {f"{s}_{name}": getattr(rows, s)(pi) for name, rows in self.rows.items() for s in ("rms", "peak")}
+
+    @cached_property
+    def residual(self) -> float:
+        """Largest residual of the conditions over the moving mass [-]; first moments count at the chain's length."""
+        if self.conditions is None or not self.conditions.rank:
+            return 0.0
+        return float(np.abs(self.conditions.residual(self.parameters)).max() / self.chain.mass)
+
+    @property
+    def added_mass(self) -> float:
+        """Moving mass gained [kg]."""
+        return float(self.parameters[:, 0].sum()) - self.original.mass
+
+    @cached_property
+    def chain(self) -> ClosedChain:
+        """The designed mechanism.
+
+        Raises:
+            InfeasibleError: there is none; the message holds the certificate.
+        """
+        if not self.feasible:
+            raise InfeasibleError(
+                f"{self.original.name} cannot be balanced ({self.kind}) within the bounds: {self.certificate}"
+            )
+        return self.original.with_inertial_parameters(self.parameters)
+
+
+def change_of(body: str, pi: Array) -> Change:
+    """Describe ten inertial parameters as a body."""
+    if pi[0] <= 0.0:
+        return Change(body, float(pi[0]), np.zeros(3), np.zeros((3, 3)), pi)
+    inertia = pin.Inertia.FromDynamicParameters(pi)
+    return Change(body, float(pi[0]), np.array(inertia.lever), np.array(inertia.inertia), pi)
