@@ -11,6 +11,7 @@ from fivebar_pin import _bodies
 from fivebar_pin import closures as rows
 from fivebar_pin._arrays import Array, cross, frozen
 from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of
+from fivebar_pin._tree import Poses
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.trajectory import Trajectory
 
@@ -23,17 +24,21 @@ class Reactions:
         multipliers: closure forces in the rows of J (n, m); of least norm where the closures are redundant.
         closure: wrench by body 1 on body 2 at the closure point (n, closures, 6) [N, N m].
         joint: wrench by the parent on the body of every joint, motor included, at the joint origin (n, nb, 6).
+        closure_local: `closure` in the axes of frame 1.
+        joint_local: `joint` in the axes of the joint, that is of the body it carries.
         bodies: momenta of the bodies and their rates.
         gravity, external: wrench on every body at the world origin (n, nb, 6).
         mismatch: largest unbalanced joint torque [N m or N]; round-off when the trajectory is consistent.
 
-    Components of `closure` and `joint` that the closures do not determine (they depend on which of the redundant
-    rows carries the load) are nan.
+    Components that the closures do not determine (they depend on which of the redundant rows carries the load) are
+    nan, judged in the axes they are given in: in a plane that is tilted in the world, the local axes tell more.
     """
 
     multipliers: Array
     closure: Array
     joint: Array
+    closure_local: Array
+    joint_local: Array
     bodies: _bodies.BodyRates
     gravity: Array
     external: Array
@@ -45,81 +50,103 @@ def reactions(
 ) -> Reactions:
     """Compute all reactions; see `Reactions`."""
     loops = loops_of(chain)
-    tree, n = loops.tree, len(trajectory)
+    tree = loops.tree
     poses = tree.poses(trajectory.q)
     rates = tree.rates(trajectory.q, trajectory.v, poses)
     bodies = _bodies.Bodies.of(chain)
     moving = _bodies.body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = _bodies.gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
-    applied = np.zeros_like(moving.rate)
+    applied = _applied(chain, poses, external, moving.rate.shape)
+    unbalanced = np.array(tree_torque)
+    unbalanced[:, loops.actuated] -= torque
+    forces = _closure_forces(loops, poses, unbalanced)
+    carried = _carried(chain, loops, moving.rate - gravity - applied, forces.wrench)
+    slack = _carried(chain, loops, np.zeros((*forces.free.shape[:2], *carried.shape[1:])), forces.free)
+    unit = np.r_[np.ones(3), np.full(3, chain.length)]
+    closure = _seen(forces.wrench, forces.free, forces.point, forces.axes, unit)
+    joint = _seen(carried, slack, np.stack(poses.p[1:], axis=1), np.stack(poses.R[1:], axis=1), unit)
+    return Reactions(
+        forces.multipliers, closure[0], joint[0], closure[1], joint[1], moving, gravity, applied, forces.mismatch
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ClosureForces:
+    multipliers: Array  # (n, m)
+    wrench: Array  # on body 2, at the world origin (n, nc, 6)
+    free: Array  # what redundant closures could carry besides, for a basis of unit forces (n, k, nc, 6)
+    point: Array  # of the closures (n, nc, 3)
+    axes: Array  # of frame 1 (n, nc, 3, 3)
+    mismatch: float
+
+
+def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureForces:
+    """Solve J^T lambda = unbalanced torque (n, nv), lambda of least norm."""
+    n = unbalanced.shape[0]
+    if not loops.m:
+        none = np.zeros((n, 0, 6))
+        mismatch = float(np.abs(unbalanced).max(initial=0.0))
+        return _ClosureForces(np.zeros((n, 0)), none, none[:, None], none[..., :3], np.zeros((n, 0, 3, 3)), mismatch)
+    pairs = loops.pairs(poses)
+    J = loops.jacobian(poses, pairs)
+    U, s, Vt = np.linalg.svd(loops.row_scale[:, None] * J * loops.column_scale, full_matrices=True)
+    rank = int(np.min(np.sum(s > RANK_TOLERANCE * np.maximum(s[:, :1], 1e-300), axis=1)))
+    k = s.shape[1]
+    inverse = np.where(np.arange(k) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)
+    loaded = np.matmul(Vt[:, :k], (unbalanced * loops.column_scale)[..., None])[..., 0] * inverse
+    multipliers = np.matmul(U[:, :, :k], loaded[..., None])[..., 0] * loops.row_scale
+    null = np.swapaxes(U[:, :, rank:], 1, 2) * loops.row_scale * loops.length  # (n, k, m)
+    wrench, free = [], []
+    for anchored, pair in zip(loops.anchored, pairs, strict=True):
+        T = rows.selector(anchored.closure, pair)
+        wrench.append(np.einsum("nmi,nm->ni", T, multipliers[:, anchored.rows]))
+        free.append(np.einsum("nmi,nkm->nki", T, null[:, :, anchored.rows]))
+    return _ClosureForces(
+        frozen(multipliers),
+        np.stack(wrench, axis=1),
+        np.stack(free, axis=2),
+        np.stack([pair.p2 for pair in pairs], axis=1),
+        np.stack([pair.R1 for pair in pairs], axis=1),
+        float(np.abs(unbalanced - np.einsum("nmk,nm->nk", J, multipliers)).max(initial=0.0)),
+    )
+
+
+def _applied(chain: ClosedChain, poses: Poses, external: Mapping[str, Array], shape: tuple[int, ...]) -> Array:
+    """Return the external wrench on every body at the world origin (n, nb, 6)."""
+    applied = np.zeros(shape)
     for name, wrench in external.items():
         frame = chain.model.frames[chain.model.getFrameId(name)]
         j = int(frame.parentJoint)
         if j:
             point = poses.p[j] + np.matmul(poses.R[j], np.array(frame.placement.translation))
             applied[:, j - 1] += _at_origin(wrench, point)
-    unbalanced = np.array(tree_torque)
-    unbalanced[:, loops.actuated] -= torque
-    multipliers, wrenches, free = _closure_forces(loops, poses, unbalanced)
-    left = moving.rate - gravity - applied
-    closure, joint, mismatch = np.zeros((n, len(chain.closures), 6)), np.array(left), 0.0
-    open_closure, open_joint = np.zeros_like(closure), np.zeros_like(joint)
-    if loops.m:
-        pairs = loops.pairs(poses)
-        points = [pair.p2 for pair in pairs]
-        for k, w in enumerate(wrenches):
-            closure[:, k] = _at_point(w, points[k])
-            open_closure[:, k] = np.linalg.norm(_at_point(free[k], points[k][:, None]), axis=1)
-        mismatch = float(np.abs(unbalanced - np.einsum("nmk,nm->nk", loops.jacobian(poses, pairs), multipliers)).max())
+    return applied
+
+
+def _carried(chain: ClosedChain, loops: Loops, bodies: Array, closures: Array) -> Array:
+    """Return what every joint passes on (..., nb, 6) from what its bodies need and the closures (..., nc, 6) give."""
+    needed = np.array(bodies)
     for k, anchored in enumerate(loops.anchored):
         for j, sign in zip(anchored.joints, (1.0, -1.0), strict=True):
             if j:
-                joint[:, j - 1] += sign * wrenches[k]
-    joint = _subtree(chain, joint)
-    if loops.m and free[0].shape[1]:
-        slack = np.zeros((n, free[0].shape[1], joint.shape[1], 6))
-        for k, anchored in enumerate(loops.anchored):
-            for j, sign in zip(anchored.joints, (1.0, -1.0), strict=True):
-                if j:
-                    slack[:, :, j - 1] += sign * free[k]
-        slack = _subtree(chain, slack)
-        origin = np.stack(poses.p[1:], axis=1)
-        open_joint = np.linalg.norm(_at_point(slack, origin[:, None]), axis=1)
-    joint = _at_point(joint, np.stack(poses.p[1:], axis=1))
-    unit = np.r_[np.ones(3), np.full(3, chain.length)]
-    closure[open_closure > 1e-9 * unit] = np.nan
-    joint[open_joint > 1e-9 * unit] = np.nan
-    return Reactions(frozen(multipliers), frozen(closure), frozen(joint), moving, gravity, applied, mismatch)
+                needed[..., j - 1, :] += sign * closures[..., k, :]
+    return _subtree(chain, needed)
 
 
-def _closure_forces(loops: Loops, poses: object, unbalanced: Array) -> tuple[Array, list[Array], list[Array]]:
-    """Solve J^T lambda = unbalanced torque.
+def _seen(wrench: Array, slack: Array, point: Array, axes: Array, unit: Array) -> tuple[Array, Array]:
+    """Move wrenches (n, x, 6) to their points, in world and in local axes; nan where slack (n, k, x, 6) reaches."""
+    at, loose = _at_point(wrench, point), _at_point(slack, point[:, None])
+    local, loose_local = _turned(at, axes), _turned(loose, axes[:, None])
+    for values, free in ((at, loose), (local, loose_local)):
+        values[np.linalg.norm(free, axis=1) > 1e-9 * unit] = np.nan
+    return frozen(at), frozen(local)
 
-    Returns:
-        lambda (n, m), the wrench on body 2 of every closure at the world origin (n, 6), and the wrenches (n, k, 6)
-        that redundant closures could carry besides, for a basis of unit forces.
-    """
-    from fivebar_pin._tree import Poses
 
-    assert isinstance(poses, Poses)
-    n = unbalanced.shape[0]
-    if not loops.m:
-        return np.zeros((n, 0)), [], []
-    pairs = loops.pairs(poses)
-    J = loops.jacobian(poses, pairs) * loops.row_scale[:, None]
-    U, s, Vt = np.linalg.svd(J * loops.column_scale, full_matrices=True)
-    rank = int(np.min(np.sum(s > RANK_TOLERANCE * np.maximum(s[:, :1], 1e-300), axis=1)))
-    inv = np.where(np.arange(s.shape[1]) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)
-    k = s.shape[1]
-    loaded = np.matmul(Vt[:, :k], (unbalanced * loops.column_scale)[..., None])[..., 0] * inv
-    multipliers = np.matmul(U[:, :, :k], loaded[..., None])[..., 0] * loops.row_scale
-    null = np.swapaxes(U[:, :, rank:], 1, 2) * loops.row_scale * loops.length  # (n, k, m)
-    wrenches, free = [], []
-    for anchored, pair in zip(loops.anchored, pairs, strict=True):
-        T = rows.selector(anchored.closure, pair)
-        wrenches.append(np.einsum("nmi,nm->ni", T, multipliers[:, anchored.rows]))
-        free.append(np.einsum("nmi,nkm->nki", T, null[:, :, anchored.rows]))
-    return multipliers, wrenches, free
+def _turned(wrench: Array, axes: Array) -> Array:
+    """Return wrenches (..., 6) in the axes R (..., 3, 3)."""
+    RT = np.swapaxes(axes, -1, -2)
+    parts = [np.matmul(RT, wrench[..., k : k + 3, None])[..., 0] for k in (0, 3)]
+    return np.concatenate(parts, axis=-1)
 
 
 def _subtree(chain: ClosedChain, wrench: Array) -> Array:

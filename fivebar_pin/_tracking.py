@@ -77,7 +77,7 @@ def follow(loops: Loops, node: _Node, target: Array) -> _Node:
         if reached is None:
             step *= 0.5
             if step < _SHORTEST:
-                raise _blocked(loops, node, x)
+                raise _blocked(loops, node, target)
             continue
         node, done = reached, done + step
         step *= 2.0
@@ -236,7 +236,7 @@ def _apart(loops: Loops, q0: Array, q1: Array) -> bool:
 
 
 def _blocked(loops: Loops, node: _Node, x: Array) -> AssemblyError | SingularityError:
-    """Say why there is no way on from a node towards x: out of reach, or a singularity in between."""
+    """Say why there is no way from a node to x: x is out of reach, or a singularity lies in between."""
     q = np.array(node.q[None])
     _set_actuated(loops, q, x[None])
     found = search(loops, q)

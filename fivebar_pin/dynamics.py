@@ -81,9 +81,19 @@ class Loads:
         return self.reactions.joint
 
     @property
+    def joint_reactions_local(self) -> Array:
+        """The same in the axes of the joint: in a tilted plane fewer components are open (n, njoints - 1, 6)."""
+        return self.reactions.joint_local
+
+    @property
     def closure_reactions(self) -> Array:
         """Wrench by body 1 on body 2 of every closure, about the closure point (n, closures, 6) [N, N m]."""
         return self.reactions.closure
+
+    @property
+    def closure_reactions_local(self) -> Array:
+        """The same in the axes of the closure's frame 1 (n, closures, 6) [N, N m]."""
+        return self.reactions.closure_local
 
     @cached_property
     def kinetic_energy(self) -> Array:

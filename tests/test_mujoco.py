@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fivebar_pin as fb
-from fivebar_pin.cli.view import sway
+from fivebar_pin.cli._moving import sway
 
 GRAVITY = (0.4, -9.81, 0.7)
 PLANAR_OR_SPATIAL = [name for name in fb.io.shipped() if fb.load(fb.io.shipped_path(name)).na]

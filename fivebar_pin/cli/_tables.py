@@ -31,7 +31,7 @@ def table(console: Console, title: str, headings: Sequence[str], rows: Sequence[
     from rich.markup import escape
     from rich.table import Table
 
-    made = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_header=any(headings))
     for k, heading in enumerate(headings):
         made.add_column(escape(heading), justify="right" if k else "left", no_wrap=True)
     for row in rows:

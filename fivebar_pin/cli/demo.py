@@ -12,9 +12,8 @@ import numpy as np
 from fivebar_pin import motion as laws
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.cli import _tables
+from fivebar_pin.cli import _output, _tables
 from fivebar_pin.dynamics import Loads, inverse_dynamics
-from fivebar_pin.errors import OutputError
 from fivebar_pin.kinematics import drive
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
@@ -68,7 +67,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Do the whole job."""
     from fivebar_pin import paper, viz
 
-    folder = _prepared(Path(chosen.out), overwrite=chosen.overwrite)
+    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite)
     mode = paper.AssemblyMode[chosen.mode.upper()]
     motion = (
         laws.from_file(chosen.motion)
@@ -93,21 +92,6 @@ def run(chosen: argparse.Namespace) -> int:
         console.print("Opening the live view; Ctrl-C ends it.")
         viz.view(_shown(runs), speed=chosen.speed, title=_title(chosen.case))
     return 0
-
-
-def _prepared(folder: Path, *, overwrite: bool) -> Path:
-    """Make the folder; refuse one that holds results already."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".writable"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise OutputError(folder, f"cannot be written ({error.strerror or error}); choose another --out") from error
-    there = sorted(path.name for path in folder.iterdir())
-    if there and not overwrite:
-        raise OutputError(folder, f"is not empty (holds {there[0]}); choose another --out, or pass --overwrite")
-    return folder
 
 
 def _moved(label: str, linkage: FiveBar, motion: Motion, mode: AssemblyMode, gravity: Any) -> _Run:
@@ -240,6 +224,4 @@ def _write_table(file: Path, runs: list[_Run], motion: Motion) -> Path:
         columns.append((f"{r.label} M_O1 [N m]", r.loads.shaking_moment[:, 2]))
         for name, values in vectors.items():
             columns += [(f"{r.label} {name.format(axis)}", values[:, k]) for k, axis in enumerate("xy")]
-    header = ",".join(name for name, _ in columns)
-    np.savetxt(file, np.column_stack([x for _, x in columns]), delimiter=",", header=header, comments="", fmt="%.17g")
-    return file
+    return _output.write_columns(file, columns)

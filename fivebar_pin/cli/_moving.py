@@ -1,0 +1,66 @@
+"""Moving a mechanism about which nothing is known but its file."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fivebar_pin import motion as laws
+from fivebar_pin._arrays import Array
+from fivebar_pin._loops import loops_of
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import AssemblyError, SingularityError
+from fivebar_pin.kinematics import assemble, drive
+from fivebar_pin.trajectory import Trajectory
+
+
+def moved(chain: ClosedChain, file: str | None) -> Trajectory:
+    """Move the chain as the file says, else let its motors sway as far as they can, else let it stand."""
+    if file:
+        return drive(chain, laws.from_file(file))
+    q0 = standing(chain)
+    swaying = sway(chain, q0)
+    if swaying is not None:
+        return swaying
+    at = [loops_of(chain).tree.coordinate(q0[None], int(k))[0] for k in chain.actuated_index]
+    rest = np.zeros((1, chain.na))
+    return drive(chain, laws.Motion(np.zeros(1), np.array(at)[None], rest, rest), near=q0, limits="ignore")
+
+
+def standing(chain: ClosedChain) -> Array:
+    """Return some assembled configuration: the model's own reference if it has one that closes."""
+    import pinocchio as pin
+
+    loops = loops_of(chain)
+    for q in [*chain.references.values(), pin.neutral(chain.model)]:
+        at = np.array([loops.tree.coordinate(q[None], int(k))[0] for k in chain.actuated_index])
+        try:
+            return assemble(chain, at, q)
+        except (AssemblyError, SingularityError):
+            continue
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        try:
+            return assemble(chain, rng.uniform(-np.pi, np.pi, chain.na) * loops.column_scale[chain.actuated_index])
+        except AssemblyError as error:
+            last = error
+    raise last
+
+
+def sway(chain: ClosedChain, q0: Array, *, samples: int = 121, period: float = 2.0) -> Trajectory | None:
+    """Swing every motor about q0, each at its own pace, with the largest amplitude that the mechanism allows."""
+    if not chain.na:
+        return None
+    loops = loops_of(chain)
+    t = np.linspace(0.0, period, samples)
+    at = [float(loops.tree.coordinate(q0[None], int(k))[0]) for k in chain.actuated_index]
+    scale = loops.column_scale[chain.actuated_index]
+    for amplitude in (0.8, 0.5, 0.3, 0.15, 0.05):
+        swings = [
+            laws.harmonic(t, x, amplitude * s, period=period / (k + 1), phase=-0.5 * np.pi)
+            for k, (x, s) in enumerate(zip(at, scale, strict=True))
+        ]
+        try:
+            return drive(chain, laws.combine(*swings), near=q0, limits="ignore")
+        except (AssemblyError, SingularityError):
+            continue
+    return None

@@ -1,0 +1,86 @@
+"""`fivebar-pin loads`: torques, shaking force and moment of any mechanism along a motion."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from fivebar_pin import motion as laws
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.cli import _output, _tables
+from fivebar_pin.cli._moving import moved
+from fivebar_pin.dynamics import Loads, inverse_dynamics
+from fivebar_pin.trajectory import Trajectory
+
+
+def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    parser = commands.add_parser("loads", help="torques, shaking force and moment of a mechanism along a motion")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument(
+        "--motion", metavar="CSV", help="motion of the actuated joints (t, q_*, v_*, a_*); unless given, they sway"
+    )
+    parser.add_argument("--about", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"))
+    parser.add_argument("--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="instead of the file's")
+    parser.add_argument("--out", metavar="FOLDER", help="write the curves, plots and an animation there")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
+    parser.set_defaults(run=run)
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Move the mechanism and print what it takes."""
+    from fivebar_pin.cli._load import load_any
+
+    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite) if chosen.out else None
+    chain = load_any(chosen.path)
+    if chosen.gravity:
+        chain = chain.with_gravity(chosen.gravity)
+    trajectory = moved(chain, chosen.motion)
+    loads = inverse_dynamics(chain, trajectory, about=chosen.about)
+    console = _tables.console()
+    _print(console, chain, trajectory, loads)
+    if folder is not None:
+        motion = laws.from_file(chosen.motion) if chosen.motion else None
+        for file in _write(folder, chain, trajectory, loads, motion, overwrite=chosen.overwrite):
+            console.print(f"  {file}", markup=False)
+    return 0
+
+
+def _print(console: object, chain: ClosedChain, trajectory: Trajectory, loads: Loads) -> None:
+    t = trajectory.t
+    curves: list[tuple[str, np.ndarray]] = [
+        (f"drive at {name} [{'N' if _output.joint_unit(chain, name) == 'm' else 'N m'}]", loads.torque[:, k])
+        for k, name in enumerate(chain.actuated)
+    ]
+    about = ", ".join(f"{x:g}" for x in loads.about)
+    curves += [("shaking force [N]", loads.shaking_force), (f"shaking moment at ({about}) [N m]", loads.shaking_moment)]
+    rows = [[name, _tables.number(_tables.peak(x)), _tables.number(_tables.rms(x, t))] for name, x in curves]
+    _tables.table(console, f"{chain.name}: {len(t)} samples, {t[-1] - t[0]:g} s", ("", "peak", "RMS"), rows)  # type: ignore[arg-type]
+    rows = [
+        ["closure residual [m or rad]", _tables.number(trajectory.worst_closure)],
+        ["motor power against rate of energy", _tables.number(loads.power_residual())],
+        ["shaking wrench against rate of momentum", _tables.number(loads.momentum_residual())],
+        ["travel of the mass centre [m]", _tables.number(_tables.peak(loads.com - loads.com[0]))],
+    ]
+    _tables.table(console, "Checks", ("", ""), rows)  # type: ignore[arg-type]
+
+
+def _write(
+    folder: Path,
+    chain: ClosedChain,
+    trajectory: Trajectory,
+    loads: Loads,
+    motion: laws.Motion | None,
+    *,
+    overwrite: bool,
+) -> list[Path]:
+    from fivebar_pin import viz
+
+    columns = _output.motion_columns(chain, trajectory) + _output.load_columns(chain, loads)
+    files = [_output.write_columns(folder / "loads.csv", columns)]
+    files += viz.plots.save(_output.figures(chain, trajectory, loads, motion), folder, overwrite=overwrite)  # type: ignore[arg-type]
+    shown = [viz.Shown(chain, trajectory, loads)]
+    files.append(viz.html(folder / "animation.html", shown, title=chain.name, overwrite=overwrite))
+    return files
