@@ -110,7 +110,7 @@ class Diagnosis:
             where the actuated joints do not determine the motion [-].
         amplification: largest passive speed per unit actuated speed here, scaled [-]; infinite at the singularity.
         determinate_joints: which components of every joint's reaction are determinate (njoints - 1, 6).
-        determinate_closures: the same for the closures (closures, 6); force and moment, world axes.
+        determinate_closures: the same for the closures (closures, 6), axes of frame 1; force before moment.
         joints, closures: names that the rows of these two belong to.
         problems: findings, the gravest first.
     """
@@ -182,7 +182,7 @@ def _lines(d: Diagnosis) -> Iterator[str]:
         yield _entry("type 2", f"singularity at distance {d.sigma:.3g} ({speeds})")
     for k, option in enumerate(d.actuated_sets[:_SHOWN]):
         yield _entry("" if k else "could drive", f"{', '.join(option.joints)} ({option.sigma:.3g})")
-    yield "  determinate reactions, world axes"
+    yield "  determinate reactions, in the axes of the joint or of the first closure frame"
     width = max(map(len, (*d.joints, *d.closures)), default=0)
     for name in (*d.joints, *d.closures):
         yield f"    {name:{width}s}  {d.determinate(name) or 'none'}"

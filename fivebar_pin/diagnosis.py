@@ -178,7 +178,7 @@ def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], n
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
     loads = inverse_dynamics(chain, still)
     out = []
-    for reaction in (loads.joint_reactions[0], loads.closure_reactions[0]):
+    for reaction in (loads.joint_reactions_local[0], loads.closure_reactions_local[0]):
         mask = np.isfinite(reaction)
         mask.setflags(write=False)
         out.append(mask)

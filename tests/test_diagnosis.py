@@ -306,8 +306,8 @@ def test_determinate_reactions_are_those_the_dynamics_does_not_mark():
         q = np.array(d.q)
         still = dataclasses.replace(still, q=[[_coordinate(chain, q, j) for j in chain.actuated]])
         loads = fb.inverse_dynamics(chain, fb.drive(chain, still, q))
-        np.testing.assert_array_equal(d.determinate_joints, np.isfinite(loads.joint_reactions[0]))
-        np.testing.assert_array_equal(d.determinate_closures, np.isfinite(loads.closure_reactions[0]))
+        np.testing.assert_array_equal(d.determinate_joints, np.isfinite(loads.joint_reactions_local[0]))
+        np.testing.assert_array_equal(d.determinate_closures, np.isfinite(loads.closure_reactions_local[0]))
 
 
 def _coordinate(chain: fb.ClosedChain, q: np.ndarray, joint: str) -> float:
