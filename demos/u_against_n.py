@@ -1,7 +1,7 @@
 """Compare the paper's complement u, as printed and repaired, with the complement N of Pinocchio's Jacobian.
 
-    python demos/u_against_n.py             # and show the linkage in the browser
-    python demos/u_against_n.py --headless  # numbers only
+python demos/u_against_n.py             # and show the linkage in the browser
+python demos/u_against_n.py --headless  # numbers only
 """
 
 import argparse
