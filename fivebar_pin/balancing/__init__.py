@@ -7,6 +7,7 @@ from fivebar_pin.balancing.design import Certificate, Change, Design
 from fivebar_pin.balancing.problem import BalanceProblem, balance, balance_problem
 from fivebar_pin.balancing.regions import Ball, Box, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
+from fivebar_pin.balancing.scoring import Scores, score
 
 __all__ = [
     "QUANTITIES",
@@ -19,8 +20,10 @@ __all__ = [
     "Design",
     "Ellipsoid",
     "Regressor",
+    "Scores",
     "balance",
     "balance_conditions",
     "balance_problem",
     "regressor",
+    "score",
 ]

@@ -1,0 +1,206 @@
+"""Scoring many mass distributions: the kinematics is paid once, a design costs one small matrix product.
+
+A quantity along the motions is F pi + f. With the triangular factor R of [F f] / sqrt(n), its rms is |R (pi, 1)|, and
+R has no more rows than there are parameters that matter, however long the motions are. Peaks need all samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin.balancing._quantities import Rows, measure, reflected_inertia, trajectories
+from fivebar_pin.balancing._terms import LINEAR, TERMS, base, check_terms, measure_of
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.motion import Motion
+from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["Scores", "score"]
+
+_NOISE = 1e-15  # singular values of a factor below this share of the largest are round-off [-]
+_PEAK_VALUES = 2_000_000  # intermediate values per block when peaks are wanted
+_BLOCK = 8192
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scores:
+    """Values of the terms for every design.
+
+    Attributes:
+        values: by term name, (k,) each.
+    """
+
+    values: MappingProxyType[str, Array]
+
+    def __getitem__(self, term: str) -> Array:
+        return self.values[term]
+
+    def __len__(self) -> int:
+        return int(next(iter(self.values.values())).size)
+
+    def __repr__(self) -> str:
+        best = ", ".join(f"{name} from {x.min():.4g}" for name, x in self.values.items()) if len(self) else ""
+        return f"Scores({len(self)} designs; {best})"
+
+    def best(self, term: str) -> int:
+        """Return the index of the design with the smallest value."""
+        return int(np.argmin(self.values[term]))
+
+
+def score(
+    chain: ClosedChain,
+    motions: Motion | Trajectory | Sequence[Motion | Trajectory],
+    designs: npt.ArrayLike,
+    *,
+    terms: Sequence[str] = ("rms_shaking_force", "rms_shaking_moment", "rms_torque"),
+    about: npt.ArrayLike = (0.0, 0.0, 0.0),
+    near: npt.ArrayLike | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Scores:
+    """Evaluate many mass distributions of one chain along the same motions.
+
+    Args:
+        chain: the mechanism; gravity, friction and rotor inertia are its own, the bodies those of the designs.
+        motions: motions (driven from `near`) or trajectories.
+        designs: inertial parameters (k, nb, 10), or (nb, 10) for one.
+        terms: rms_, peak_ or mean_square_ of torque (all motors), shaking_force, shaking_moment, bearing_force,
+            angular_momentum (deviation from the mean); added_mass, inertia. Vectors count with their length.
+        about: point of moments (3,) [m].
+        near: picks the assembly mode of motions.
+        progress: called with (designs done, designs in all) after every block.
+
+    Raises:
+        UnknownNameError: a term that does not exist.
+        InvalidInputError: designs of the wrong shape, not finite, or not physical (which one).
+    """
+    wanted = (terms,) if isinstance(terms, str) else tuple(terms)
+    check_terms(wanted, "term")
+    if "distance" in wanted or not wanted:
+        raise InvalidInputError("terms", wanted, f"must be some of {[t for t in TERMS if t != 'distance']}")
+    X = _designs(chain, designs)
+    point = checked("about", about, (3,))
+    paths = trajectories(chain, motions, near)
+    names = dict.fromkeys(m for m in map(measure_of, wanted) if m is not None)
+    rows = {m: measure(chain, paths, m, about=point) for m in names}
+    factors = _factors({base(t): rows[m] for t in wanted if (m := measure_of(t)) and not t.startswith("peak")}, chain)
+    linear = {t: _linear(chain, paths, t) for t in wanted if t in LINEAR}
+    peaks = {t: rows[m] for t in wanted if t.startswith("peak") and (m := measure_of(t))}
+    out = {t: np.empty(len(X)) for t in wanted}
+    block = _BLOCK
+    if peaks:
+        block = max(1, min(block, _PEAK_VALUES // max(r.F.shape[0] * r.F.shape[1] for r in peaks.values())))
+    for start in range(0, len(X), block):
+        part = slice(start, min(start + block, len(X)))
+        _require_physical(X[part], start, chain)
+        _fill(out, part, X[part].reshape(part.stop - start, -1), factors, linear, peaks)
+        if progress is not None:
+            progress(part.stop, len(X))
+    return Scores(MappingProxyType({t: frozen(x) for t, x in out.items()}))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Factors:
+    """All triangular factors side by side: rms of a term = |(x[columns] @ W + w)[parts[term]]|."""
+
+    columns: npt.NDArray[np.intp]
+    W: Array  # (columns, r)
+    w: Array  # (r,)
+    parts: dict[str, slice]
+
+
+def _factors(rows: dict[str, Rows], chain: ClosedChain) -> _Factors:
+    scale = np.tile(chain.length ** np.array([0.0] + [1.0] * 3 + [2.0] * 6), len(chain.joints))
+    found, parts, done = [np.zeros((0, scale.size + 1))], {}, 0
+    for name, row in rows.items():
+        stacked = np.concatenate([row.F * scale, row.f[..., None]], axis=2).reshape(-1, scale.size + 1)
+        R = np.asarray(np.linalg.qr(stacked / np.sqrt(len(row.F)), mode="r"))
+        _, s, Vt = np.linalg.svd(R, full_matrices=False)
+        keep = s > _NOISE * max(float(s[0]) if s.size else 0.0, 1e-300)
+        W = s[keep, None] * Vt[keep]
+        W[np.abs(W) < _NOISE * np.abs(W).max(initial=0.0)] = 0.0
+        found.append(W)
+        parts[name] = slice(done, done + len(W))
+        done += len(W)
+    both = np.concatenate(found)
+    columns = np.flatnonzero(np.any(both[:, :-1], axis=0))
+    return _Factors(columns, np.ascontiguousarray((both[:, columns] / scale[columns]).T), both[:, -1], parts)
+
+
+def _linear(chain: ClosedChain, paths: Sequence[Trajectory], term: str) -> tuple[Array, float]:
+    weight = np.zeros(10 * len(chain.joints))
+    weight[::10] = 1.0
+    if term == "added_mass":
+        return weight, -chain.mass
+    return reflected_inertia(chain, paths), 0.0
+
+
+def _fill(
+    out: dict[str, Array],
+    part: slice,
+    x: Array,
+    factors: _Factors,
+    linear: dict[str, tuple[Array, float]],
+    peaks: dict[str, Rows],
+) -> None:
+    squares: dict[str, Array] = {}
+    if factors.parts:
+        y = x[:, factors.columns] @ factors.W
+        y += factors.w
+        squares = {name: np.einsum("kr,kr->k", y[:, s], y[:, s]) for name, s in factors.parts.items()}
+    for term, values in out.items():
+        if term in linear:
+            weight, constant = linear[term]
+            values[part] = x @ weight + constant
+        elif term in peaks:
+            values[part] = _peak(peaks[term], x)
+        else:
+            square = squares[base(term)]
+            values[part] = square if term.startswith("mean_square_") else np.sqrt(square)
+
+
+def _peak(rows: Rows, x: Array) -> Array:
+    n, r, P = rows.F.shape
+    values = (x @ rows.F.reshape(n * r, P).T + rows.f.reshape(-1)).reshape(len(x), n, r)
+    values *= values
+    lengths = [values[:, :, g].sum(axis=2).max(axis=1) for g in rows.groups]
+    return np.asarray(np.sqrt(np.max(lengths, axis=0))) if lengths else np.zeros(len(x))
+
+
+def _designs(chain: ClosedChain, designs: npt.ArrayLike) -> Array:
+    X = np.asarray(designs, dtype=np.float64)
+    nb = len(chain.joints)
+    X = X[None] if X.ndim == 2 else X
+    if X.ndim != 3 or X.shape[1:] != (nb, 10):
+        raise InvalidInputError("shape of designs", X.shape, f"must be (k, {nb}, 10)")
+    return X
+
+
+def _require_physical(X: Array, start: int, chain: ClosedChain, tolerance: float = 1e-9) -> None:
+    """Raise for a body whose second moments about its mass centre are not positive semidefinite.
+
+    A symmetric matrix is so when its three invariants are not negative.
+    """
+    m, x, y, z, xx, xy, yy, xz, yz, zz = np.ascontiguousarray(np.moveaxis(X, 2, 0))
+    with np.errstate(all="ignore"):  # nan fails every comparison below
+        per = 1.0 / np.where(m > 0.0, m, 1.0)
+        px, py, pz, half = x * per, y * per, z * per, 0.5 * (xx + yy + zz)
+        a, b, c = half - xx - x * px, half - yy - y * py, half - zz - z * pz
+        d, e, f = -xy - x * py, -xz - x * pz, -yz - y * pz
+        size = np.abs(half) + x * px + y * py + z * pz
+        ok = (m >= 0.0) & (m < np.inf) & (a + b + c >= -tolerance * size)
+        ok &= a * b + a * c + b * c - d * d - e * e - f * f >= -tolerance * size**2
+        ok &= a * (b * c - f * f) - d * (d * c - e * f) + e * (d * f - b * e) >= -tolerance * size**3
+        ok &= (m > 0.0) | ((x == 0.0) & (y == 0.0) & (z == 0.0))
+    if not ok.all():
+        k, body = (int(i) for i in np.argwhere(~ok)[0])
+        raise InvalidInputError(
+            f"design {start + k}, body {chain.joints[body]}",
+            [float(v) for v in X[k, body]],
+            "is not physical: mass and second moments about the mass centre must not be negative",
+        )

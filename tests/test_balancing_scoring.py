@@ -1,0 +1,106 @@
+"""Scores of many designs are what each design's own chain measures."""
+
+from __future__ import annotations
+
+import mechanisms
+import numpy as np
+import pytest
+
+import fivebar_pin as fb
+from fivebar_pin import paper
+from fivebar_pin.balancing import balance, score
+from fivebar_pin.dynamics import inverse_dynamics
+from fivebar_pin.errors import InvalidInputError, UnknownNameError
+
+
+def five_bar() -> tuple[fb.ClosedChain, tuple[fb.Trajectory, fb.Trajectory]]:
+    linkage = paper.table_1("I", "unbalanced")
+    chain = linkage.chain(gravity=(0.5, -9.0, 1.0))
+    model = chain.model.copy()
+    model.damping[:] = 1e-3
+    chain = fb.ClosedChain(model, chain.closures, chain.actuated)
+    fast, slow = paper.default_motion(samples=31), paper.default_motion(samples=21, period=2.0)
+    near = linkage.configuration(*fast.q[0])
+    return chain, (fb.drive(chain, fast, near=near), fb.drive(chain, slow, near=near))
+
+
+def designs(chain: fb.ClosedChain, k: int) -> np.ndarray:
+    return np.stack(
+        [
+            [mechanisms.body(100 * i + b, size=0.05).toDynamicParameters() for b in range(len(chain.joints))]
+            for i in range(k)
+        ]
+    )
+
+
+def test_scores_agree_with_inverse_dynamics_design_by_design() -> None:
+    """rms over all samples of both motions, peaks over samples and motors; gravity and damping included, 1e-12."""
+    chain, paths = five_bar()
+    X = designs(chain, 5)
+    names = ("torque", "shaking_force", "shaking_moment")
+    found = score(chain, paths, X, terms=[f"{s}_{m}" for m in names for s in ("rms", "peak", "mean_square")])
+    for k, x in enumerate(X):
+        loads = [inverse_dynamics(chain.with_inertial_parameters(x), path) for path in paths]
+        for name in names:
+            values = np.concatenate([getattr(load, name) for load in loads])
+            rms = np.sqrt((values**2).sum(axis=1).mean())
+            peak = np.abs(values).max() if name == "torque" else np.linalg.norm(values, axis=1).max()
+            assert found[f"rms_{name}"][k] == pytest.approx(rms, rel=1e-12)
+            assert found[f"mean_square_{name}"][k] == pytest.approx(rms**2, rel=1e-12)
+            assert found[f"peak_{name}"][k] == pytest.approx(peak, rel=1e-12)
+
+
+def test_bearing_forces_momentum_and_linear_terms_agree_too() -> None:
+    chain, paths = five_bar()
+    X = designs(chain, 3)
+    found = score(
+        chain,
+        paths[0],
+        X,
+        terms=("peak_bearing_force", "rms_angular_momentum", "added_mass", "inertia"),
+        about=(0.1, 0, 0),
+    )
+    for k, x in enumerate(X):
+        loads = inverse_dynamics(chain.with_inertial_parameters(x), paths[0])
+        forces = np.concatenate([loads.joint_reactions[:, :, :2], loads.closure_reactions[:, :, :2]], axis=1)
+        assert found["peak_bearing_force"][k] >= np.linalg.norm(forces, axis=2).max() * (1 - 1e-12)
+        momentum = loads.reactions.bodies.momentum.sum(axis=1)
+        angular = momentum[:, 3:] - np.cross((0.1, 0, 0), momentum[:, :3])
+        deviation = angular - angular.mean(axis=0)
+        assert found["rms_angular_momentum"][k] == pytest.approx(np.sqrt((deviation**2).sum(axis=1).mean()), rel=1e-12)
+        assert found["added_mass"][k] == pytest.approx(x[:, 0].sum() - chain.mass)
+    assert (found["inertia"] > 0).all()
+
+
+def test_blocks_and_progress_do_not_change_the_scores() -> None:
+    chain, paths = five_bar()
+    X = np.repeat(designs(chain, 3), 4000, axis=0)
+    seen: list[tuple[int, int]] = []
+    found = score(chain, paths[0], X, progress=lambda done, total: seen.append((done, total)))
+    assert seen[-1] == (12000, 12000) and len(seen) > 1
+    np.testing.assert_allclose(found["rms_torque"][::4000], score(chain, paths[0], X[::4000])["rms_torque"], rtol=1e-13)
+    assert found["rms_torque"][found.best("rms_torque")] == found["rms_torque"].min()
+
+
+def test_a_balanced_design_scores_zero_shaking_force() -> None:
+    linkage = paper.table_1("I", "unbalanced")
+    chain, motion = linkage.chain(), paper.default_motion(samples=31)
+    near = linkage.configuration(*motion.q[0])
+    design = balance(chain, "force")
+    found = score(chain, motion, np.stack([chain.inertial_parameters, design.parameters]), near=near)
+    assert found["rms_shaking_force"][0] > 0.5
+    assert found["rms_shaking_force"][1] < 1e-13
+
+
+def test_designs_that_cannot_be_scored_are_named() -> None:
+    chain, paths = five_bar()
+    X = designs(chain, 4)
+    with pytest.raises(InvalidInputError, match=r"must be \(k, 4, 10\)"):
+        score(chain, paths, X[:, :3])
+    with pytest.raises(UnknownNameError, match="rms_torque"):
+        score(chain, paths, X, terms=("torque",))
+    for entry, value in (((2, 1, 0), -0.1), ((2, 1, 9), 1e-9), ((2, 1, 5), np.nan), ((2, 1, 0), np.inf)):
+        bad = X.copy()
+        bad[entry] = value
+        with pytest.raises(InvalidInputError, match="design 2, body phi_gamma"):
+            score(chain, paths, bad)
