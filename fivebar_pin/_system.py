@@ -21,6 +21,7 @@ import pinocchio as pin
 from fivebar_pin import _springs
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin._manifold import Manifold, Point, manifold_of
+from fivebar_pin._mass import depth_first, mass_matrix
 from fivebar_pin._springs import JointSpring, Spring, SpringForces
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import ClosureKind
@@ -134,10 +135,13 @@ class System:
         model, data = self.chain.model, self.data
         M, bias = np.empty((q.shape[0], v.shape[1], v.shape[1])), np.empty_like(v)
         for i in range(q.shape[0]):
-            M[i] = pin.crba(model, data, q[i])
+            M[i] = mass_matrix(model, data, q[i], ordered=self._ordered)
             bias[i] = pin.nonLinearEffects(model, data, q[i], v[i])
-        upper = np.triu(M)
-        return upper + np.swapaxes(np.triu(M, 1), 1, 2), bias
+        return M, bias
+
+    @cached_property
+    def _ordered(self) -> bool:
+        return depth_first(self.chain.model)
 
 
 def checked_wrench(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] | None, n: int) -> dict[str, Array]:
