@@ -17,13 +17,11 @@ SWING = 0.15  # amplitude of the hips [rad]
 
 
 def swung(chain):
-    """Swing every hip about the standing pose, front and hind against each other."""
+    """Swing every hip about the standing pose, all together."""
     q0 = chain.references["home"]
     t = np.linspace(0.0, PERIOD, 201)
     hips = [q0[chain.model.idx_qs[chain.model.getJointId(joint)]] for joint in chain.actuated]
-    swings = [
-        fb.motion.harmonic(t, hip, SWING * (-1) ** k, period=PERIOD, phase=-0.5 * np.pi) for k, hip in enumerate(hips)
-    ]
+    swings = [fb.motion.harmonic(t, hip, SWING, period=PERIOD, phase=-0.5 * np.pi) for hip in hips]
     trajectory = fb.drive(chain, fb.motion.combine(*swings), near=q0)
     return trajectory, fb.inverse_dynamics(chain, trajectory)
 
