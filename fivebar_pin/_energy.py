@@ -28,6 +28,7 @@ class EnergyBalance:
         stored_rate: of potential and elastic energy together (n,).
         supplied: by the motors and the forces from outside (n,).
         dissipated: by joint damping, dry friction and the springs' dampers (n,).
+        exchanged: sizes of all powers together, body by body (n,); the scale of the residual.
     """
 
     kinetic: Array
@@ -37,6 +38,7 @@ class EnergyBalance:
     stored_rate: Array
     supplied: Array
     dissipated: Array
+    exchanged: Array
 
     @property
     def total(self) -> Array:
@@ -56,8 +58,7 @@ class EnergyBalance:
     def residual(self) -> float:
         """Return the largest mismatch of the rates: kinetic + stored = supplied - dissipated, relative [-]."""
         mismatch = np.abs(self.kinetic_rate + self.stored_rate - self.supplied + self.dissipated)
-        scale = sum(np.abs(x) for x in (self.kinetic_rate, self.stored_rate, self.supplied, self.dissipated))
-        return float(mismatch.max() / max(float(scale.max()), 1e-300))
+        return float(mismatch.max() / max(float(self.exchanged.max()), 1e-300))
 
 
 def energy_balance(
@@ -94,16 +95,19 @@ def energy_balance(
     armature = np.array(chain.model.armature)
     sprung = system.spring_forces(point, v)
     applied = system.wrench_forces(point, checked_wrench(chain, external, n))
-    damped = np.sum(system.damping * v * v + system.friction * np.abs(v), axis=1)
     rotors = armature * v
+    inertial = np.sum(moving.rate * moving.twist, axis=2)  # (n, nb)
+    heavy = np.sum(weight * moving.twist, axis=2)
+    driven = np.column_stack([tau * v[:, chain.actuated_index], applied * v])
+    dissipated = np.sum(system.damping * v * v + system.friction * np.abs(v), axis=1) + sprung.dissipation
+    gross = [inertial, heavy, driven, sprung.force * v, dissipated[:, None]]
     return EnergyBalance(
         kinetic=frozen(0.5 * np.sum(moving.twist * moving.momentum, axis=(1, 2)) + 0.5 * np.sum(rotors * v, axis=1)),
         potential=frozen(-np.einsum("nbi,i,b->n", moving.centre, gravity, bodies.mass)),
         elastic=frozen(sprung.energy),
-        kinetic_rate=frozen(np.sum(moving.rate * moving.twist, axis=(1, 2)) + np.sum(rotors * trajectory.a, axis=1)),
-        stored_rate=frozen(
-            -np.sum(weight * moving.twist, axis=(1, 2)) - np.sum(sprung.force * v, axis=1) - sprung.dissipation
-        ),
-        supplied=frozen(np.sum(tau * v[:, chain.actuated_index], axis=1) + np.sum(applied * v, axis=1)),
-        dissipated=frozen(damped + sprung.dissipation),
+        kinetic_rate=frozen(inertial.sum(axis=1) + np.sum(rotors * trajectory.a, axis=1)),
+        stored_rate=frozen(-heavy.sum(axis=1) - np.sum(sprung.force * v, axis=1) - sprung.dissipation),
+        supplied=frozen(driven.sum(axis=1)),
+        dissipated=frozen(dissipated),
+        exchanged=frozen(np.sum([np.abs(x).sum(axis=1) for x in gross], axis=0)),
     )

@@ -16,6 +16,8 @@ from fivebar_pin.errors import SingularityError, SolverError
 _TURNED = 0.7  # cosine between chart and tangent space at which the chart is changed
 _FAR = 1.5  # distance from its middle at which a chart is changed [rad, or chain lengths]
 _SMOOTH = 0.02  # mismatch of a step with the velocities and accelerations at its ends, relative
+_LOST = 1e-7  # scaled singular value below which round-off decides on the direction of motion [-]
+_NO_END = 1e-5  # scaled singular value that a step may not end below: round-off would show in the velocity [-]
 _NEARLY_SINGULAR = 1e-3  # scaled singular value at which a failure is put down to a bifurcation [-]
 
 
@@ -84,7 +86,7 @@ class Motion:
         if not np.all(np.isfinite(y)):
             return None
         point = manifold.solve(self.chart, y[:f], self.predict(t) if guess is None else guess, self.rank)
-        if point is None:
+        if point is None or sigma_of(point, self.rank) < _LOST:
             return None
         T = point.Vt[0, self.rank :].T  # tangent space here (nv, f)
         try:
@@ -135,6 +137,8 @@ def next_node(motion: Motion, t: float, y: Array) -> Node | None:
         return None
     point, v, a = found
     node, sigma = motion.node, sigma_of(point, motion.rank)
+    if sigma < _NO_END:
+        return None
     falling = (node.sigma - sigma) / (t - node.t)
     ahead = sigma / falling if falling > 0.0 else np.inf
     return Node(t, point, v, a, (a - node.a) / (t - node.t), sigma, ahead)

@@ -171,6 +171,6 @@ def _point(p: Array, J: Array) -> Array:
 
 def _check_numbers(name: str, stiffness: float, length: float, damping: float) -> None:
     for what, value in (("stiffness", stiffness), ("rest", length), ("damping", damping)):
-        checked(f"{what} of {name}", value, ())
+        checked(f"{what} of {name}", [value], (1,))
         if what != "rest" and value < 0.0:
             raise InvalidInputError(f"{what} of {name}", value, "must be >= 0")
