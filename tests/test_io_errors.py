@@ -150,7 +150,7 @@ BAD_SIDECAR = [
     (SIDECAR + "gravity: [0, 0]\n", "gravity: has 2 entries; expected 3"),
     (SIDECAR + "gravity: down\n", "gravity: must be a list, is a str"),
     (SIDECAR + "gravity: [0, 0, 1.0e+999]\n", "must be a finite number"),
-    (SIDECAR + "joint_order: [j2, j1]\n", "must go through the tree depth first"),
+    (SIDECAR + "joint_order: [j2, j1]\n", "'j2' comes before 'j1', which carries it"),
     (SIDECAR + "joint_order: [j1]\n", "must name each of the 2 moving joints once"),
     (SIDECAR + "joint_order: [j1, j3]\n", "Unknown moving joint 'j3'"),
     (SIDECAR + "joint_data: {j3: {armature: [1]}}\n", "Unknown joint 'j3'"),

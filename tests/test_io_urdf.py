@@ -154,6 +154,24 @@ def test_saving_what_was_loaded_writes_the_same_files(tmp_path: Path) -> None:
     assert [p.read_text().count("<link") for p in (first[0], second[0], third[0])] == [11] * 3
 
 
+@pytest.mark.parametrize("formats", ["urdf", "mjcf"])
+def test_joints_in_breadth_first_order_come_back(tmp_path: Path, formats: str) -> None:
+    """Any order in which parents come before children is kept, in both formats, with its home."""
+    rng = np.random.default_rng(7)
+    model = pin.Model()
+    for name, parent in (("b", ""), ("a", ""), ("d", "b"), ("c", "a"), ("e", "b")):
+        j = model.addJoint(model.getJointId(parent) if parent else 0, pin.JointModelRZ(), random_placement(rng), name)
+        model.appendBodyToJoint(j, random_inertia(rng), pin.SE3.Identity())
+        model.addFrame(pin.Frame(f"{name}_tip", j, 0, random_placement(rng), pin.FrameType.OP_FRAME))
+    home = rng.normal(size=5)
+    model.referenceConfigurations["home"] = home
+    chain = ClosedChain(model, (Closure(("d_tip", "c_tip")),), ("a", "e"))
+    path = io.save(chain, tmp_path, formats=formats)[0]
+    back = io.load(path)
+    assert_same(chain, back, rtol=2e-15)
+    np.testing.assert_array_equal(back.model.referenceConfigurations["home"], home)
+
+
 def test_visuals_come_back(tmp_path: Path) -> None:
     """Shapes keep their frame, size, pose and colour; a capsule comes back as the cylinder and spheres it is."""
     plain = paper.table_1("I", "unbalanced").chain()

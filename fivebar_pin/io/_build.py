@@ -143,7 +143,7 @@ class _Builder:
         wanted = [name for name in sidecar.joint_order if name in moving]
         if sorted(wanted) != sorted(moving):
             raise FileFormatError(beside, f"joint_order: must name each of the {len(moving)} moving joints once")
-        return _depth_first(self.tree, {name: k for k, name in enumerate(wanted)}, wanted, beside)
+        return _with_fixed(self.tree, wanted, beside)
 
     def joint(self, joint: JointEntry) -> None:
         parent, M, frame = self.link[joint.parent]
@@ -174,24 +174,24 @@ class _Builder:
             self.inertias.setdefault(joint, []).append((placement, inertia))
 
 
-def _depth_first(tree: TreeEntry, rank: dict[str, int], wanted: list[str], beside: Path) -> list[str]:
-    """Return all joints so that the moving ones come in the wanted order and fixed ones right after their parent."""
-    children: dict[str, list[str]] = {}
-    for name in joint_order(tree):
-        children.setdefault(tree.joints[name].parent, []).append(name)
-    first: dict[str, int] = {}
-    for name in reversed(joint_order(tree)):
-        below = [first[child] for child in children.get(tree.joints[name].child, [])]
-        first[name] = rank.get(name, min(below, default=-1))
+def _with_fixed(tree: TreeEntry, wanted: list[str], beside: Path) -> list[str]:
+    """Return all joints, the moving ones in the wanted order, fixed ones as soon as a moving one needs their link."""
+    above = {joint.child: joint for joint in tree.joints.values()}
     order: list[str] = []
-    stack = sorted(children.get(tree.root, []), key=first.__getitem__, reverse=True)
-    while stack:
-        order.append(stack.pop())
-        stack.extend(sorted(children.get(tree.joints[order[-1]].child, []), key=first.__getitem__, reverse=True))
-    if [name for name in order if name in rank] != wanted:
-        problem = "joint_order: must go through the tree depth first (each joint before the joints it carries, one"
-        raise FileFormatError(beside, problem + " branch finished before the next begins)")
-    return order
+    there = {tree.root}
+    for name in wanted:
+        fixed: list[JointEntry] = []
+        link = tree.joints[name].parent
+        while link not in there:
+            if above[link].kind != "fixed":
+                problem = f"{name!r} comes before {above[link].name!r}, which carries it"
+                raise FileFormatError(beside, f"joint_order: {problem}")
+            fixed.append(above[link])
+            link = above[link].parent
+        for joint in (*reversed(fixed), tree.joints[name]):
+            order.append(joint.name)
+            there.add(joint.child)
+    return order + [name for name in joint_order(tree) if tree.joints[name].child not in there]
 
 
 def bare_inertia(mass: float, com: Array, tensor: Array) -> pin.Inertia:

@@ -19,10 +19,14 @@ from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
 from fivebar_pin.io._sidecar import Sidecar
 from fivebar_pin.io._xml import parse_xml
 
-__all__ = ["HINGE", "UNBOUNDED", "read_mjcf"]
+__all__ = ["HINGE", "ORDER", "UNBOUNDED", "read_mjcf"]
 
-HINGE, UNBOUNDED = "revolute closure ", "unbounded "
-"""Names of <custom><numeric> entries: the axis of a hinge made of two connects; a hinge that turns without bounds."""
+HINGE, UNBOUNDED, ORDER = "revolute closure ", "unbounded ", "joint order"
+"""Names of <custom><numeric> entries that our writer makes.
+
+The axis of a hinge made of two connects; a hinge whose coordinates are cosine and sine; for each joint its place in the
+file's order, when the chain has them in another.
+"""
 
 _SECTIONS = (
     "actuator", "asset", "compiler", "contact", "custom", "default", "equality", "keyframe", "option", "sensor", "size",
@@ -66,9 +70,9 @@ def read_mjcf(
     found = _Equality(reader, root, bodies).closures() if closures is None else closures
     driven = _actuated(reader, root, bodies) if actuated is None else actuated
     tree = bodies.tree(root.get("model") or path.stem)
-    sidecar = Sidecar(gravity=_gravity(reader, root), joint_order=tuple(bodies.order), joint_data=bodies.data)
+    sidecar = Sidecar(gravity=_gravity(reader, root), joint_order=_order(reader, root, bodies), joint_data=bodies.data)
     model = build_model(tree, sidecar, free_flyer=False, urdf=path, beside=path)
-    _keyframes(reader, root, model)
+    _keyframes(reader, root, model, bodies.order)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     try:
         return ClosedChain(model, found, driven, name=tree.name, visuals=visuals)
@@ -113,6 +117,17 @@ def _meshes(reader: MjcfReader, root: ElementTree.Element) -> dict[str, str]:
     return meshes
 
 
+def _order(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> tuple[str, ...]:
+    """Return the joints in the file's order, or in the one that our writer noted."""
+    for numeric in root.findall("custom/numeric"):
+        if numeric.get("name") == ORDER:
+            places = reader.numbers(numeric, "data", len(bodies.order), f"custom {ORDER!r}", None)
+            if sorted(places) != list(range(len(places))):
+                raise reader.fail(f"custom {ORDER!r}", "must name each place once")
+            return tuple(bodies.order[int(k)] for k in places)
+    return tuple(bodies.order)
+
+
 def _unbounded(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> None:
     """Make hinges that were saved from joints of two coordinates (cosine, sine) such joints again."""
     from dataclasses import replace
@@ -145,7 +160,7 @@ def _actuated(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -
     return tuple(names)
 
 
-def _keyframes(reader: MjcfReader, root: ElementTree.Element, model: pin.Model) -> None:
+def _keyframes(reader: MjcfReader, root: ElementTree.Element, model: pin.Model, order: list[str]) -> None:
     """Keep keyframes as reference configurations, quaternions turned from (w, x, y, z) to (x, y, z, w)."""
     size = sum(
         {"JointModelSpherical": 4, "JointModelFreeFlyer": 7}.get(j.shortname(), 1) for j in list(model.joints)[1:]
@@ -155,25 +170,25 @@ def _keyframes(reader: MjcfReader, root: ElementTree.Element, model: pin.Model) 
         if "qpos" not in key.attrib:
             continue
         qpos = np.array(reader.numbers(key, "qpos", size, where, None))
-        model.referenceConfigurations[key.get("name") or f"key{k}"] = _from_qpos(reader, model, qpos, where)
+        model.referenceConfigurations[key.get("name") or f"key{k}"] = _from_qpos(reader, model, qpos, order, where)
 
 
-def _from_qpos(reader: MjcfReader, model: pin.Model, qpos: Array, where: str) -> Array:
-    parts: list[Array] = []
-    for j in range(1, model.njoints):
+def _from_qpos(reader: MjcfReader, model: pin.Model, qpos: Array, order: list[str], where: str) -> Array:
+    parts: dict[int, Array] = {}
+    for j in (model.getJointId(name) for name in order):
         kind = model.joints[j].shortname()
         take = _WIDTHS.get(kind, 1)
         mine, qpos = qpos[:take], qpos[take:]
         if take == 1:
-            parts.append(np.array([np.cos(mine[0]), np.sin(mine[0])]) if model.nqs[j] == 2 else mine)
+            parts[j] = np.array([np.cos(mine[0]), np.sin(mine[0])]) if model.nqs[j] == 2 else mine
             continue
         quaternion = reader.unit(mine[-4:], "qpos", where)
         if take == 7:
             world = pin.SE3(homogeneous(mine[:3], quaternion_matrix(quaternion)))
-            parts.append(pin.SE3ToXYZQUAT(model.jointPlacements[j].actInv(world)))
+            parts[j] = pin.SE3ToXYZQUAT(model.jointPlacements[j].actInv(world))
         else:
-            parts.append(np.roll(quaternion, -1))
-    return np.concatenate(parts)
+            parts[j] = np.roll(quaternion, -1)
+    return np.concatenate([parts[j] for j in sorted(parts)])
 
 
 class _Equality:

@@ -1,8 +1,9 @@
 """A chain to MJCF text: bodies at their joints, frames as sites, closures as connect and weld.
 
 A revolute closure becomes two connects, at the closure's frames and at a second point of the hinge axis; a
-<custom><numeric> entry with the axis marks the pair, so that reading gives the one revolute closure back. MJCF has no
-place for velocity limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
+<custom><numeric> entry with the axis marks the pair, so that reading gives the one revolute closure back. A second
+entry keeps the order of joints that were not added depth first. MJCF has no place for velocity limits, rotor inertias
+and gear ratios; the URDF and its sidecar keep them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.io._mjcf import HINGE, UNBOUNDED
+from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
 from fivebar_pin.io._outline import outline
 from fivebar_pin.io._tree import JointEntry, TreeEntry
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
@@ -47,11 +48,15 @@ class _Writer:
             self.below.setdefault(joint.parent, []).append(joint)
         self.extra_sites: dict[str, list[tuple[str, Array]]] = {}
         self.numeric: list[str] = []
+        self.order: list[int] = []
         self.sites = {j.child for j in self.tree.joints.values() if j.kind == "fixed"}
 
     def text(self) -> str:
         equality = self.equality()
         bodies = self.contents(self.tree.root, "    ")
+        if self.order != sorted(self.order):
+            places = numbers([self.order.index(j) for j in sorted(self.order)])
+            self.numeric.append(f'    <numeric name="{ORDER}" data="{places}"/>')
         motors = [f"    <motor name={quoteattr(a)} joint={quoteattr(a)}/>" for a in self.chain.actuated]
         gravity = numbers(self.model.gravity.linear)
         meshes = [f"    <mesh name={quoteattr(n)} file={quoteattr(f)}/>" for f, n in self.meshes.items()]
@@ -115,6 +120,7 @@ class _Writer:
     def joint(self, joint: JointEntry, indent: str) -> str:
         model, j = self.model, self.model.getJointId(joint.name)
         kind = _KINDS.get(joint.kind)
+        self.order.append(j)
         if kind is None:
             short = model.joints[j].shortname()
             hint = "Save it as URDF only: formats=('urdf',)."
@@ -188,7 +194,7 @@ class _Writer:
     def keyframes(self) -> list[str]:
         lines = []
         for name, q in configurations(self.model):
-            qpos = np.concatenate([self.qpos(j, q) for j in range(1, self.model.njoints)])
+            qpos = np.concatenate([self.qpos(j, q) for j in self.order])
             lines.append(f'    <key name={quoteattr(name)} qpos="{numbers(qpos)}"/>')
         return lines
 
