@@ -93,3 +93,12 @@ def figures(chain: ClosedChain, trajectory: Trajectory, loads: Loads, motion: Mo
     if motion is not None and chain.na:
         made["motion"] = plots.motion(motion, chain.actuated)
     return made
+
+
+def fresh_file(file: Path) -> Path:
+    """Return the path of a file that is to be written; refuse one that exists."""
+    if file.exists():
+        raise OutputError(file, "exists already; choose another --out")
+    if not file.parent.is_dir():
+        raise OutputError(file, "lies in a folder that does not exist; make it first")
+    return file

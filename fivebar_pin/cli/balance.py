@@ -1,0 +1,229 @@
+"""`fivebar-pin conditions`, `balance` and `pareto`: any mechanism, from its balancing conditions to a file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.cli import _output, _tables
+from fivebar_pin.cli._moving import moved
+from fivebar_pin.dynamics import inverse_dynamics
+from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.trajectory import Trajectory
+
+KINDS = ("force", "moment", "dynamic", "static")
+
+
+def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the commands to the parser."""
+    conditions = commands.add_parser("conditions", help="the balancing conditions of a mechanism")
+    _common(conditions)
+    conditions.set_defaults(run=run_conditions)
+    balance = commands.add_parser(
+        "balance",
+        help="the globally optimal balanced design, or the proof that there is none",
+        description="Balance a mechanism; exit code 1 when it is proved to be impossible within the bounds.",
+    )
+    _common(balance)
+    _designing(balance)
+    balance.add_argument("--minimise", action="append", metavar="TERM[=WEIGHT]", help="what to minimise; repeatable")
+    balance.add_argument("--limit", action="append", metavar="TERM=VALUE", help="upper bound on a term; repeatable")
+    balance.add_argument("--out", metavar="FOLDER", help="write the design, the curves and a page before / after there")
+    balance.add_argument("--overwrite", action="store_true", help="replace files that exist already")
+    balance.add_argument("--view", action="store_true", help="open the live view before / after (Ctrl-C ends it)")
+    balance.set_defaults(run=run_balance)
+    pareto = commands.add_parser("pareto", help="the front between two objectives of balanced designs")
+    _common(pareto)
+    _designing(pareto)
+    pareto.add_argument("first", help="term that is bounded step by step")
+    pareto.add_argument("second", help="term that is minimised under each bound")
+    pareto.add_argument("--points", type=int, default=11, help="designs on the front [11]")
+    pareto.add_argument("--out", metavar="CSV", help="write the front as a table")
+    pareto.set_defaults(run=run_pareto)
+
+
+def run_conditions(chosen: argparse.Namespace) -> int:
+    """Find and print the conditions, and how far the mechanism is from them."""
+    from fivebar_pin.balancing import balance_conditions
+    from fivebar_pin.cli._load import load_any
+
+    chain = load_any(chosen.path)
+    conditions = balance_conditions(chain, chosen.kind)
+    console = _tables.console()
+    console.print(str(conditions), markup=False, soft_wrap=True)
+    residual = np.abs(conditions.residual(chain)).max(initial=0.0)
+    console.print(f"largest residual of {chain.name} as it is: {residual:.4g}", markup=False)
+    return 0
+
+
+def run_balance(chosen: argparse.Namespace) -> int:
+    """Balance, print, write."""
+    from fivebar_pin.balancing import balance
+    from fivebar_pin.cli._load import load_any
+
+    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite) if chosen.out else None
+    chain = load_any(chosen.path)
+    trajectory = moved(chain, chosen.motion)
+    minimise = {name: 1.0 if value is None else value for name, value in _pairs("--minimise", chosen.minimise)}
+    limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
+    console = _tables.console()
+    with console.status("balancing"):
+        design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, **_options(chosen, trajectory))
+    if not design.feasible:
+        console.print(repr(design), markup=False, soft_wrap=True)
+        return 1
+    pair = _moving(design, trajectory)
+    _print_design(console, design, pair)
+    if folder is not None:
+        for file in _write(folder, design, trajectory, pair, overwrite=chosen.overwrite):
+            console.print(f"  {file}", markup=False)
+    if chosen.view:
+        from fivebar_pin import viz
+
+        viz.view(pair, title=_title(design))
+    return 0
+
+
+def run_pareto(chosen: argparse.Namespace) -> int:
+    """Trace the front, print and write it."""
+    from fivebar_pin.balancing import pareto
+    from fivebar_pin.cli._load import load_any
+
+    chain = load_any(chosen.path)
+    options = _options(chosen, moved(chain, chosen.motion))
+    console = _tables.console()
+    with console.status("tracing the front"):
+        front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)
+    rows = [[f"{a:.6g}", f"{b:.6g}"] for a, b in front.values]
+    _tables.table(console, f"{chain.name}: {chosen.kind} balance", (chosen.first, chosen.second), rows)
+    if chosen.out:
+        columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]
+        console.print(f"  {_output.write_columns(_output.fresh_file(Path(chosen.out)), columns)}", markup=False)
+    return 0
+
+
+def _common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("--kind", choices=KINDS, default="force", help="what is to vanish [force]")
+
+
+def _designing(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--mode", choices=("add", "redesign"), default="add", help="add material, or redesign [add]")
+    parser.add_argument("--bodies", nargs="+", metavar="JOINT", help="bodies that may change, by joint [all]")
+    parser.add_argument("--radius", type=float, help="material lies within this distance of each joint [m]")
+    parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
+
+
+def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, Any]:
+    from fivebar_pin.balancing import Ball
+
+    return {
+        "mode": chosen.mode,
+        "bodies": chosen.bodies,
+        "region": None if chosen.radius is None else Ball(chosen.radius),
+        "motions": [trajectory],
+    }
+
+
+def _pairs(option: str, words: list[str] | None) -> list[tuple[str, float | None]]:
+    """Read NAME or NAME=NUMBER."""
+    out: list[tuple[str, float | None]] = []
+    for word in words or []:
+        name, equals, number = word.partition("=")
+        try:
+            out.append((name, float(number) if equals else None))
+        except ValueError:
+            raise InvalidInputError(option, word, "must be NAME=NUMBER") from None
+    return out
+
+
+def _given(option: str, name: str, value: float | None) -> float:
+    if value is None:
+        raise InvalidInputError(option, name, "must be NAME=NUMBER")
+    return value
+
+
+def _title(design: Any) -> str:
+    return f"{design.original.name}: {design.kind} balance (weight left out of the force)"
+
+
+def _print_design(console: Any, design: Any, pair: list[Any]) -> None:
+    changes = [("added", c) for c in design.added] + [("removed", c) for c in design.removed]
+    rows = [
+        [word, c.body, f"{c.mass:.6g}", ", ".join(f"{x + 0.0:.5g}" for x in np.round(c.place, 12)), _inertia(c)]
+        for word, c in changes
+        if c.mass > 1e-7 * design.original.mass
+    ]
+    title = f"{design.original.name}: {design.kind} balance, {design.status}; moving mass {design.added_mass:+.6g} kg"
+    _tables.table(console, title, ("", "body of joint", "mass [kg]", "at [m], joint axes", "Izz at its centre"), rows)
+    t = pair[0].trajectory.t
+    rows = []
+    for name, curves in _curves(design, pair).items():
+        cells = [_tables.number(x) for c in curves for x in (_tables.peak(c), _tables.rms(c, t))]
+        rows.append([name, *cells])
+    _tables.table(
+        console, "Along the motion (* weight left out)", ("", "before: peak", "RMS", "after: peak", "RMS"), rows
+    )
+    rows = [
+        ["objective", f"{design.objective:.9g}"],
+        ["no design is better than", f"{design.dual_bound:.9g}"],
+        ["residual of the conditions, relative", _tables.number(design.residual)],
+    ]
+    _tables.table(console, "Certificate", ("", ""), rows)
+
+
+def _inertia(change: Any) -> str:
+    return _tables.number(float(change.inertia[2, 2]))
+
+
+def _moving(design: Any, trajectory: Trajectory) -> list[Any]:
+    """Return before and after for the viewer, with the loads of inertia alone: weight does not shake."""
+    from fivebar_pin.viz import Shown
+
+    out = []
+    for label, chain in (("before", design.original), ("after", design.chain)):
+        weightless = chain.with_gravity((0.0, 0.0, 0.0))
+        out.append(Shown(weightless, trajectory, inverse_dynamics(weightless, trajectory), label))
+    return out
+
+
+def _curves(design: Any, pair: list[Any]) -> dict[str, list[Array]]:
+    """Return the curves to compare: torques with gravity, shaking force and moment without the weight."""
+    trajectory = pair[0].trajectory
+    whole = [inverse_dynamics(chain, trajectory) for chain in (design.original, design.chain)]
+    curves: dict[str, list[Array]] = {}
+    for k, name in enumerate(design.original.actuated):
+        unit = "N" if _output.joint_unit(design.original, name) == "m" else "N m"
+        curves[f"drive at {name} [{unit}]"] = [loads.torque[:, k] for loads in whole]
+    curves["shaking force* [N]"] = [one.loads.shaking_force for one in pair]
+    curves["shaking moment* [N m]"] = [one.loads.shaking_moment for one in pair]
+    return curves
+
+
+def _write(folder: Path, design: Any, trajectory: Trajectory, pair: list[Any], *, overwrite: bool) -> list[Path]:
+    from fivebar_pin import io, viz
+
+    files = list(io.save(design.chain, folder, name=f"{design.original.name}_balanced", overwrite=overwrite))
+    columns = _output.motion_columns(design.original, trajectory)
+    for label, chain in (("before", design.original), ("after", design.chain)):
+        loads = inverse_dynamics(chain, trajectory)
+        columns += [(f"{label} {name}", x) for name, x in _output.load_columns(chain, loads)]
+    files.append(_output.write_columns(folder / "results.csv", columns))
+    inertial = {one.label: one.loads for one in pair}
+    whole = {
+        "before": inverse_dynamics(design.original, trajectory),
+        "after": inverse_dynamics(design.chain, trajectory),
+    }
+    t = trajectory.t
+    figures = {
+        "shaking": viz.plots.shaking(inertial, t=t, title="Shaking force and moment, weight left out"),
+        "mass_centre": viz.plots.com(inertial),
+        "torques": viz.plots.torques(whole, design.original.actuated, t=t),
+    }
+    files += viz.plots.save(figures, folder, overwrite=overwrite)
+    files.append(viz.html(folder / "animation.html", pair, title=_title(design), overwrite=overwrite))
+    return files
