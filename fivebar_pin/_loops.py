@@ -13,7 +13,7 @@ import pinocchio as pin
 from fivebar_pin import closures as rows
 from fivebar_pin._arrays import Array
 from fivebar_pin._tree import Poses, Rates, Tree
-from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.closures import Closure, FramePair
 from fivebar_pin.errors import AssemblyError, InvalidInputError
 
@@ -109,7 +109,7 @@ class Loops:
         self.anchored: list[_Anchored] = []
         start = 0
         for closure in chain.closures:
-            frames = [model.frames[model.getFrameId(f)] for f in closure.frames]
+            frames = [find_frame(model, f) for f in closure.frames]
             i, j = (int(f.parentJoint) for f in frames)
             sign = self.tree.support[j].astype(float) - self.tree.support[i].astype(float)
             self.anchored.append(

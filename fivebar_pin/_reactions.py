@@ -12,7 +12,7 @@ from fivebar_pin import closures as rows
 from fivebar_pin._arrays import Array, cross, frozen
 from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin._tree import Poses
-from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.trajectory import Trajectory
 
 
@@ -115,7 +115,7 @@ def _applied(chain: ClosedChain, poses: Poses, external: Mapping[str, Array], sh
     """Return the external wrench on every body at the world origin (n, nb, 6)."""
     applied = np.zeros(shape)
     for name, wrench in external.items():
-        frame = chain.model.frames[chain.model.getFrameId(name)]
+        frame = find_frame(chain.model, name)
         j = int(frame.parentJoint)
         if j:
             point = poses.p[j] + np.matmul(poses.R[j], np.array(frame.placement.translation))

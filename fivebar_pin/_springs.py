@@ -14,7 +14,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, checked, cross
 from fivebar_pin._loops import Loops
 from fivebar_pin._tree import Poses
-from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
 __all__ = ["JointSpring", "Spring"]
@@ -122,7 +122,7 @@ def spring_forces(
 
 def frame_points(chain: ClosedChain, loops: Loops, frame: str, poses: Poses) -> tuple[Array, Array]:
     """Return a frame's world origin (n, 3) and the Jacobian of its twist at the world origin (n, 6, nv)."""
-    found = chain.model.frames[chain.model.getFrameId(frame)]
+    found = find_frame(chain.model, frame)
     j = int(found.parentJoint)
     point = poses.p[j] + np.matmul(poses.R[j], np.array(found.placement.translation))
     return point, poses.S * loops.tree.support[j]

@@ -144,7 +144,7 @@ class ClosedChain:
         spans = [float(np.linalg.norm(model.jointPlacements[j].translation)) for j in range(1, model.njoints)]
         for closure in self.closures:
             for f in closure.frames:
-                spans.append(float(np.linalg.norm(model.frames[model.getFrameId(f)].placement.translation)))
+                spans.append(float(np.linalg.norm(find_frame(model, f).placement.translation)))
         real = [s for s in spans if s > 0.0]
         return float(np.mean(real)) if real else 1.0
 
@@ -175,6 +175,18 @@ class ClosedChain:
         return replace(self, actuated=tuple(actuated))
 
 
+def find_frame(model: pin.Model, name: str) -> pin.Frame:
+    """Return the frame of this name; where a link and a joint share it (legal in URDF), the link's.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    found = [frame for frame in model.frames if frame.name == name]
+    if not found:
+        raise UnknownNameError("frame", name, [frame.name for frame in model.frames])
+    return next((frame for frame in found if frame.type != pin.FrameType.JOINT), found[0])
+
+
 def _check_tree(model: pin.Model) -> None:
     for j in range(1, model.njoints):
         placement, inertia = model.jointPlacements[j], model.inertias[j]
@@ -193,7 +205,7 @@ def _check_closures(model: pin.Model, closures: tuple[Closure, ...]) -> None:
         for frame in closure.frames:
             if frame not in frames:
                 raise UnknownNameError(f"frame of closure {closure.name}", frame, frames)
-        first, second = (model.frames[model.getFrameId(f)].parentJoint for f in closure.frames)
+        first, second = (find_frame(model, f).parentJoint for f in closure.frames)
         if first == second:
             raise InvalidInputError(
                 f"closure {closure.name}",

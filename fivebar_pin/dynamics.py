@@ -25,7 +25,7 @@ from fivebar_pin import _bodies
 from fivebar_pin._arrays import Array, checked, cross, frozen, numeric
 from fivebar_pin._loops import loops_of
 from fivebar_pin._reactions import Reactions, reactions
-from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.trajectory import Trajectory
 
@@ -256,7 +256,7 @@ def _applied(chain: ClosedChain, trajectory: Trajectory, applied: Mapping[str, A
     poses = loops.tree.poses(trajectory.q)
     generalised, total = np.zeros_like(trajectory.v), np.zeros((len(trajectory), 6))
     for name, wrench in applied.items():
-        frame = chain.model.frames[chain.model.getFrameId(name)]
+        frame = find_frame(chain.model, name)
         j = int(frame.parentJoint)
         point = poses.p[j] + np.matmul(poses.R[j], np.array(frame.placement.translation))
         at_origin = np.concatenate([wrench[:, :3], wrench[:, 3:] + cross(point, wrench[:, :3])], axis=1)

@@ -157,3 +157,17 @@ def test_visuals_are_checked():
 def test_every_error_belongs_to_the_family():
     for kind in (InvalidInputError, UnknownNameError):
         assert issubclass(kind, FiveBarPinError)
+
+
+def test_a_frame_name_shared_by_link_and_joint_means_the_link():
+    """URDF lets a link and a joint share a name; a closure on that name is the link's frame."""
+    model = pin.Model()
+    one = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "arm")
+    two = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "leg")
+    model.addFrame(pin.Frame("arm", one, 0, pin.SE3.Identity(), pin.FrameType.JOINT))
+    out = pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    model.addFrame(pin.Frame("arm", one, 0, out, pin.FrameType.BODY))
+    model.addFrame(pin.Frame("leg_tip", two, 0, out, pin.FrameType.OP_FRAME))
+    chain = fb.ClosedChain(model, (fb.Closure(("arm", "leg_tip")),), ("arm",))
+    np.testing.assert_allclose(fb.closure_residual(chain, np.array([0.3, 0.3])), 0.0, atol=1e-15)
+    assert np.abs(fb.closure_residual(chain, np.array([0.3, 0.0]))).max() > 0.2

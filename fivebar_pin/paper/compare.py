@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, frozen
-from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper import matrices
@@ -147,7 +147,7 @@ def _pinocchio(chain: ClosedChain, q: Array) -> tuple[Array, Array, float]:
     """Return T N (n, 12, 2), N^T M N (n, 2, 2) and the largest |J N|, all from Pinocchio."""
     model = chain.model
     data = model.createData()
-    first, second = (model.frames[model.getFrameId(f)] for f in chain.closures[0].frames)
+    first, second = (find_frame(model, f) for f in chain.closures[0].frames)
     cm = pin.PointAnchorConstraintModel(model, first.parentJoint, first.placement, second.parentJoint, second.placement)
     cdata = cm.createData()
     driven, passive = chain.actuated_index, chain.passive_index

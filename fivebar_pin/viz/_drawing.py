@@ -14,7 +14,7 @@ from fivebar_pin.viz._geometry import Poses, View, body_points
 from fivebar_pin.viz._record import Colour
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain, Visual
+    from fivebar_pin.chain import ClosedChain, Visual, find_frame
 
 __all__ = ["COLOURS", "LINK_COLOURS", "Drawing", "amid_ground", "body_names", "ground_closures", "reach", "safe"]
 
@@ -107,7 +107,7 @@ def _visual_corners(chain: ClosedChain, joint: int) -> Array:
     model, corners = chain.model, [np.empty((0, 3))]
     signs = np.array([[x, y, z, 0.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     for visual in chain.visuals:
-        frame = model.frames[model.getFrameId(visual.frame)]
+        frame = find_frame(model, visual.frame)
         if frame.parentJoint != joint or visual.shape == "mesh":
             continue
         r = visual.size[0]
@@ -127,5 +127,5 @@ def amid_ground(chain: ClosedChain) -> Array:
 
 def ground_closures(chain: ClosedChain) -> list[Array]:
     """Return the places of the closure frames that are fixed to the ground."""
-    frames = [chain.model.frames[chain.model.getFrameId(f)] for c in chain.closures for f in c.frames]
+    frames = [find_frame(chain.model, f) for c in chain.closures for f in c.frames]
     return [np.array(f.placement.translation) for f in frames if f.parentJoint == 0]

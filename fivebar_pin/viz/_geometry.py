@@ -15,7 +15,7 @@ from fivebar_pin._arrays import Array, checked
 from fivebar_pin.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain
+    from fivebar_pin.chain import ClosedChain, find_frame
     from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]
@@ -125,7 +125,7 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
     points += [np.array(model.jointPlacements[k].translation) for k in model.children[joint]]
     for closure in chain.closures:
         for name in closure.frames:
-            frame = model.frames[model.getFrameId(name)]
+            frame = find_frame(model, name)
             if frame.parentJoint == joint:
                 points.append(np.array(frame.placement.translation))
     if len(points) == 1:

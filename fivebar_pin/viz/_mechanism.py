@@ -13,7 +13,7 @@ from fivebar_pin.viz._geometry import JointShape, body_points, joint_shapes
 from fivebar_pin.viz._record import Recorder, along, pose
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain
+    from fivebar_pin.chain import ClosedChain, find_frame
 
 __all__ = ["draw_mechanism"]
 
@@ -92,7 +92,7 @@ def _draw_body_com(recorder: Recorder, path: str, drawing: Drawing, joint: int) 
 def _draw_visuals(recorder: Recorder, path: str, drawing: Drawing) -> None:
     model = drawing.chain.model
     for number, visual in enumerate(drawing.visuals):
-        frame = model.frames[model.getFrameId(visual.frame)]
+        frame = find_frame(model, visual.frame)
         node = f"{_node(drawing.chain, path, frame.parentJoint)}/visual {number}"
         recorder.place(node, frame.placement.homogeneous)
         recorder.visual(f"{node}/shape", visual)
@@ -103,7 +103,7 @@ def _draw_closures(recorder: Recorder, path: str, drawing: Drawing) -> None:
     model, r = drawing.chain.model, drawing.radius
     for closure in drawing.chain.closures:
         for number, name in enumerate(closure.frames):
-            frame = model.frames[model.getFrameId(name)]
+            frame = find_frame(model, name)
             node = f"{_node(drawing.chain, path, frame.parentJoint)}/closure {safe(closure.name)} {number + 1}"
             recorder.place(node, frame.placement.homogeneous)
             colour = COLOURS["closure"] if number == 0 else COLOURS["joint"]

@@ -17,7 +17,7 @@ from fivebar_pin.viz._record import Colour, Recorder
 from fivebar_pin.viz._stage import Stage
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain
+    from fivebar_pin.chain import ClosedChain, find_frame
 
 __all__ = ["describe", "render"]
 
@@ -105,7 +105,7 @@ def _link_entries(drawing: Drawing) -> list[tuple[str, Colour]]:
     model = drawing.chain.model
     entries = []
     for j, name in enumerate(body_names(drawing.chain), start=1):
-        visuals = [v for v in drawing.visuals if model.frames[model.getFrameId(v.frame)].parentJoint == j]
+        visuals = [v for v in drawing.visuals if find_frame(model, v.frame).parentJoint == j]
         if not visuals:
             entries.append((name, LINK_COLOURS[(j - 1) % len(LINK_COLOURS)]))
         coloured = dict.fromkeys((v.frame, v.rgba) for v in visuals if max(v.rgba[:3]) > 0.3)
