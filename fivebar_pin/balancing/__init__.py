@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
 from fivebar_pin.balancing.design import Certificate, Change, Design
+from fivebar_pin.balancing.front import Comparison, ParetoFront, alici_shirinzadeh, compare, pareto
 from fivebar_pin.balancing.problem import BalanceProblem, balance, balance_problem
 from fivebar_pin.balancing.regions import Ball, Box, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
@@ -17,13 +18,18 @@ __all__ = [
     "Box",
     "Certificate",
     "Change",
+    "Comparison",
     "Design",
     "Ellipsoid",
+    "ParetoFront",
     "Regressor",
     "Scores",
+    "alici_shirinzadeh",
     "balance",
     "balance_conditions",
     "balance_problem",
+    "compare",
+    "pareto",
     "regressor",
     "score",
 ]

@@ -9,7 +9,7 @@ solution at all when some z in the dual cone has G^T z = 0 and g.z < 0 (Farkas).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +19,14 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.errors import SolverError
 
 ROOT2 = float(np.sqrt(2.0))
+# The programs come well scaled, so the solver's own equilibration is left out at first; the others are for the rest.
+_ATTEMPTS: tuple[dict[str, object], ...] = (
+    {"equilibrate_enable": False},
+    {},
+    {"max_step_fraction": 0.9},
+    {"static_regularization_constant": 1e-10},
+    {"equilibrate_enable": False, "max_step_fraction": 0.9},
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,20 +111,32 @@ class Program:
             SolverError: no solution to the tolerance and no valid certificate; Clarabel not installed.
         """
         clarabel = _clarabel()
+        failure = SolverError("the conic solver was not run")
+        for changes in _ATTEMPTS:
+            try:
+                return self._attempt(clarabel, changes, (P, q, self.g - margin * self.inward), tolerance)
+            except SolverError as error:
+                failure = error
+        raise failure
+
+    def _attempt(
+        self, clarabel: Any, changes: Mapping[str, object], data: tuple[Array, Array, Array], tolerance: float
+    ) -> Outcome:
+        """Run the solver once with some of its settings changed."""
         from scipy import sparse
 
-        offset = self.g - margin * self.inward
+        P, q, offset = data
         if self._sparse is None:
             self._sparse = sparse.csc_matrix(-self.G)
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = 300
-        for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
+        for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas", "tol_infeas_abs", "tol_infeas_rel"):
             setattr(settings, name, 1e-2 * tolerance)
-        settings.tol_infeas_abs = settings.tol_infeas_rel = 1e-10
-        solver = clarabel.DefaultSolver(
-            sparse.csc_matrix(sparse.diags(P)), q, self._sparse, offset, _cones(clarabel, self.blocks), settings
-        )
+        for name, value in changes.items():
+            setattr(settings, name, value)
+        quadratic = sparse.csc_matrix((P, (np.arange(P.size), np.arange(P.size))), shape=(P.size, P.size))
+        solver = clarabel.DefaultSolver(quadratic, q, self._sparse, offset, _cones(clarabel, self.blocks), settings)
         solution = solver.solve()
         status = str(solution.status)
         x, z = np.array(solution.x), np.array(solution.z)
@@ -126,7 +146,7 @@ class Program:
             raise SolverError(
                 "the objective can fall without bound: bound the region, the masses or choose another objective"
             )
-        return self._accept(status, x, z, (P, q, offset), tolerance)
+        return self._accept(status, x, z, data, tolerance)
 
     def _accept(self, status: str, x: Array, z: Array, data: tuple[Array, Array, Array], tolerance: float) -> Outcome:
         """Check a solution ourselves, whatever the solver calls it."""

@@ -54,6 +54,8 @@ class Design:
         added, removed: material per body that may change; for a redesign, `added` holds the new bodies.
         rows: the quantities along the given motions, for `before` and `after`.
         certificate: proof of infeasibility, else None.
+        alternatives: configurations (nq,) of branches on which there is a design although there is none for all
+            assembly modes together; pass one as `near`.
     """
 
     status: str
@@ -68,10 +70,12 @@ class Design:
     removed: tuple[Change, ...] = ()
     rows: Mapping[str, Rows] = field(default_factory=dict)
     certificate: Certificate | None = None
+    alternatives: tuple[Array, ...] = ()
 
     def __repr__(self) -> str:
         if not self.feasible:
-            return f"Design({self.original.name!r}, {self.kind}: infeasible; {self.certificate})"
+            hint = "".join(f"; possible on the branch near={q.round(6).tolist()} alone" for q in self.alternatives)
+            return f"Design({self.original.name!r}, {self.kind}: infeasible; {self.certificate}{hint})"
         return (
             f"Design({self.original.name!r}, {self.kind}: {self.status}, objective {self.objective:.6g}, "
             f"gap {self.gap:.1e}, residual {self.residual:.1e})"

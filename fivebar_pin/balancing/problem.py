@@ -13,7 +13,7 @@ below, and if there is no design a certificate proves it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -37,6 +37,7 @@ from fivebar_pin.balancing._terms import (
     rows_term,
     torque_limits,
 )
+from fivebar_pin.balancing.branches import branches
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.regions import Ball, Region, resolve
@@ -50,7 +51,7 @@ __all__ = ["BalanceProblem", "balance", "balance_problem"]
 Motions = Motion | Trajectory | Sequence[Motion | Trajectory]
 MassBounds = tuple[float, float] | Mapping[str, tuple[float, float]] | None
 _MARGINS = (1e-9, 1e-8, 1e-7, 0.0)  # how far inside the cones a design is kept, as a share of the moving mass
-_CAP = 10.0  # largest mass added to one body when the added mass is not minimised [moving masses]
+_CAP = 10.0  # largest mass added to one body unless given [moving masses]
 _PHYSICAL = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
 
 
@@ -86,8 +87,8 @@ def balance(
         region: where material may lie, one for all bodies or by body; a ball about the joint frame with the chain's
             characteristic length as radius unless given.
         masses: bounds (low, high) [kg] on the mass added to a body, or of a redesigned body; one for all or by body.
-            A redesigned body keeps between half and twice its mass unless given; added mass is free where it is
-            minimised, else each body gets at most ten times the moving mass.
+            A redesigned body keeps between half and twice its mass, and a body gets at most ten times the moving
+            mass, unless given.
         remove: bodies that material may also be taken from.
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
@@ -103,24 +104,32 @@ def balance(
         SolverError: no solution to the tolerance and no proof either.
     """
     terms = _weights(minimise, mode)
-    problem = balance_problem(
-        chain,
-        kind,
-        objectives=tuple(terms),
-        bodies=bodies,
-        mode=mode,
-        region=region,
-        masses=masses,
-        remove=remove,
-        motions=motions,
-        limits=limits,
-        gravity=gravity,
-        about=about,
-        near=near,
-        space=space,
-        seed=seed,
-    )
-    return problem.solve(terms)
+
+    def solved(near: npt.ArrayLike | None) -> Design:
+        problem = balance_problem(
+            chain,
+            kind,
+            objectives=tuple(terms),
+            bodies=bodies,
+            mode=mode,
+            region=region,
+            masses=masses,
+            remove=remove,
+            motions=motions,
+            limits=limits,
+            gravity=gravity,
+            about=about,
+            near=near,
+            space=space,
+            seed=seed,
+        )
+        return problem.solve(terms)
+
+    design = solved(near)
+    if design.feasible or design.conditions is None or near is not None:
+        return design
+    found = [b.near for b in branches(chain, design.conditions, seed=seed, gravity=gravity, about=about)]
+    return replace(design, alternatives=tuple(q for q in found if solved(q).feasible))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -156,6 +165,11 @@ class BalanceProblem:
         """Number of variables of the material."""
         return sum(m.size for m in self.materials)
 
+    def size(self, objective: str) -> float:
+        """Return the typical size of a prepared objective, in its own unit."""
+        scale = self.terms[base(objective)].scale
+        return scale * scale if objective.startswith("mean_square_") else scale
+
     def solve(self, minimise: str | Mapping[str, float], *, limits: Mapping[str, float] | None = None) -> Design:
         """Solve for other weights, or further upper bounds, of the prepared objectives.
 
@@ -169,18 +183,16 @@ class BalanceProblem:
                 raise UnknownNameError("prepared objective", name, self.terms)
         P, q, unit = self._objective(weights)
         extra = [b for name, top in (limits or {}).items() for b in self.terms[base(name)].bounded(float(top))]
-        if not weights.get("added_mass"):
-            extra += self.caps
-        program = Program(self.program.n, [*self.program.blocks, *extra]) if extra else self.program
+        free = Program(self.program.n, [*self.program.blocks, *extra]) if extra else self.program
+        program = Program(self.program.n, [*free.blocks, *self.caps]) if self.caps else free
         problem = "the design could not be made exact"
         for margin in _MARGINS:
             outcome = program.solve(P, q, margin=margin)
             if outcome.x is None:
-                if margin == _MARGINS[-1]:
-                    return self._infeasible(outcome)
                 outcome = program.solve(P, q)
-                if outcome.x is None:
-                    return self._infeasible(outcome)
+                if outcome.x is None:  # a proof that does without the caps says more
+                    unbounded = free.solve(0.0 * P, 0.0 * q)
+                    return self._infeasible(unbounded if unbounded.x is None else outcome)
             design, problem = self._finish(outcome, program, weights, (P, q, unit))
             if design is not None:
                 return design
