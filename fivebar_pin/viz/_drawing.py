@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain import find_frame
 from fivebar_pin.viz._geometry import Poses, View, body_points
 from fivebar_pin.viz._record import Colour
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain, Visual, find_frame
+    from fivebar_pin.chain import ClosedChain, Visual
 
 __all__ = ["COLOURS", "LINK_COLOURS", "Drawing", "amid_ground", "body_names", "ground_closures", "reach", "safe"]
 

@@ -12,10 +12,11 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, checked
+from fivebar_pin.chain import find_frame
 from fivebar_pin.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain, find_frame
+    from fivebar_pin.chain import ClosedChain
     from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain import find_frame
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, amid_ground, body_names, ground_closures, safe
 from fivebar_pin.viz._geometry import JointShape, body_points, joint_shapes
 from fivebar_pin.viz._record import Recorder, along, pose
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain, find_frame
+    from fivebar_pin.chain import ClosedChain
 
 __all__ = ["draw_mechanism"]
 

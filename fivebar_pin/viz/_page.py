@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain import find_frame
 from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, body_names, ground_closures
 from fivebar_pin.viz._record import Colour, Recorder
 from fivebar_pin.viz._stage import Stage
 
 if TYPE_CHECKING:
-    from fivebar_pin.chain import ClosedChain, find_frame
+    from fivebar_pin.chain import ClosedChain
 
 __all__ = ["describe", "render"]
 
