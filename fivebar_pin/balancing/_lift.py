@@ -38,7 +38,7 @@ def lift(problem: BalanceProblem, y: Array) -> Lifted:
     lowest = np.inf
     for m in problem.materials:
         own = y[m.start : m.start + m.size] * problem.mass
-        unit = np.concatenate([space.length**space.orders, np.full(m.size - m.width, space.length**2)])
+        unit = np.append(space.length**space.orders, np.full(m.size - m.width, space.length**2))
         z = own * unit
         pieces[m.sign][m.body] = _ten(problem, m, z)
         lowest = min(lowest, lowest_eigenvalue(z[: m.width], planar=m.planar))

@@ -9,12 +9,12 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing._conic import Block, svec
 from fivebar_pin.balancing._parameters import _PAIRS
-from fivebar_pin.balancing.regions import Shape
+from fivebar_pin.balancing.regions import Shape, Solid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
-    """Variables of one piece of material: parameters (4 planar or 10), then two second moments where needed.
+    """Variables of one piece of material: parameters (4 planar or 10), then auxiliary ones where needed.
 
     Attributes:
         body: index of the body.
@@ -23,6 +23,7 @@ class Material:
         planar: whether there are four parameters.
         shape: region, scaled, or None for anywhere.
         label: what certificates call it.
+        solid: bound of the discs it is to be made of, or None.
     """
 
     body: int
@@ -31,6 +32,7 @@ class Material:
     planar: bool
     shape: Shape | None
     label: str
+    solid: Solid | None = None
 
     @property
     def width(self) -> int:
@@ -45,7 +47,7 @@ class Material:
     @property
     def size(self) -> int:
         """Number of variables."""
-        return self.width + (2 if self.split else 0)
+        return self.width + (2 if self.split else 0) + (1 if self.solid is not None else 0)
 
     @property
     def parameters(self) -> slice:
@@ -57,7 +59,8 @@ class Material:
         out = [Block(f"{self.label} is a physical body", *self._physical(), np.zeros(0))]
         if self.shape is not None:
             out.append(Block(f"{self.label} stays in its region", "nonneg", -self._region(self.shape), np.zeros(0)))
-        return [self._placed(block, n) for block in out]
+        placed = [self._placed(block, n) for block in out]
+        return placed if self.solid is None else placed + [self._placed(b, n) for b in self._disc(self.solid)]
 
     def anchor(self, length: float = 0.3) -> Array:
         """Return the variables (size,) of a unit mass spread well inside the region."""
@@ -78,6 +81,8 @@ class Material:
     def _placed(self, block: Block, n: int) -> Block:
         G = np.zeros((block.G.shape[0], n))
         G[:, self.start : self.start + self.size] = block.G
+        if block.g.size:
+            return Block(block.label, block.cone, G, block.g, block.inward)
         return Block(block.label, block.cone, G, np.zeros(G.shape[0]), block.G @ self.anchor())
 
     def _unit(self, k: int) -> Array:
@@ -112,6 +117,23 @@ class Material:
         matrix = [[self._second(d, f) for f in E] + [self._first(d)] for d in E]
         matrix.append([self._first(f) for f in E] + [m])
         return "psd", svec(matrix)
+
+    def _disc(self, solid: Solid) -> list[Block]:
+        """Return I - u >= |h|^2 / m, u >= least m^2 and the line: discs, with or without a bore."""
+        m, u = self._unit(0), self._unit(self.size - 1)
+        own = self._unit(3) - u
+        label = f"{self.label} is a disc"
+        centre = np.stack([m + own, m - own, 2.0 * self._unit(1), 2.0 * self._unit(2)])
+        spread = np.stack([u / solid.least, u / solid.least, 2.0 * m])
+        tip = np.array([1.0, 0.0, 0.0])
+        blocks = [
+            Block(label, "soc", centre, np.zeros(0)),
+            Block(label, "soc", spread, np.array([1.0, -1.0, 0.0]), tip),
+        ]
+        if solid.across is not None:
+            label = f"{self.label} lies on its line"
+            blocks.append(Block(label, "zero", self._first(solid.across)[None], np.zeros(1), np.zeros(1)))
+        return blocks
 
     def _region(self, shape: Shape) -> Array:
         """Return the functionals (k, size) that must not be positive."""
@@ -150,6 +172,8 @@ class Material:
             z[3] = np.trace(S)
             if self.split:
                 z[4], z[5] = S[0, 0], S[0, 1]
+            if self.solid is not None:
+                z[-1] = 0.5 * (np.trace(S) - h @ h)
         else:
             inertia = np.trace(S) * np.eye(3) - S
             for k, (i, j) in enumerate(_PAIRS):

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing._conic import Certificate
+from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import Rows
 from fivebar_pin.balancing.conditions import BalanceConditions
 from fivebar_pin.chain import ClosedChain
@@ -46,6 +47,8 @@ class Design:
         status: "optimal" or "infeasible".
         original: the chain that was to be balanced.
         kind: what is exact, or None.
+        mode: "add" or "redesign".
+        space: parameters that the design is written in, four per body (planar) or ten.
         conditions: the balancing conditions, or None when nothing is exact.
         objective: weighted sum of the terms.
         dual_bound: no design within the bounds has a lower objective.
@@ -61,6 +64,8 @@ class Design:
     status: str
     original: ClosedChain
     kind: str | None
+    mode: str
+    space: Space
     conditions: BalanceConditions | None
     objective: float
     dual_bound: float
@@ -85,8 +90,8 @@ class Design:
         lines = [repr(self)]
         for sign, changes in (("+", self.added), ("-", self.removed)):
             for c in changes:
-                if c.mass < 1e-7 * self.original.mass:
-                    continue  # what keeps a body strictly physical
+                if c.mass == 0.0:
+                    continue
                 place = ", ".join(f"{x:.5g}" for x in c.place)
                 lines.append(f"  {sign} {c.body}: {c.mass:.6g} kg at ({place}) m")
         if self.feasible:

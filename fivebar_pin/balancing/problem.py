@@ -40,7 +40,7 @@ from fivebar_pin.balancing._terms import (
 from fivebar_pin.balancing.branches import branches
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
 from fivebar_pin.balancing.design import Design
-from fivebar_pin.balancing.regions import Ball, Region, resolve
+from fivebar_pin.balancing.regions import Ball, Disc, Region, resolve
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 from fivebar_pin.motion import Motion
@@ -52,6 +52,8 @@ Motions = Motion | Trajectory | Sequence[Motion | Trajectory]
 MassBounds = tuple[float, float] | Mapping[str, tuple[float, float]] | None
 _MARGINS = (1e-9, 1e-8, 1e-7, 0.0)  # how far inside the cones a design is kept, as a share of the moving mass
 _CAP = 10.0  # largest mass added to one body unless given [moving masses]
+_NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
+_EXACT = 1e-13  # residual of the conditions of a finished design [moving masses]
 _PHYSICAL = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
 
 
@@ -64,6 +66,7 @@ def balance(
     mode: Literal["add", "redesign"] = "add",
     region: Region | Mapping[str, Region] | None = None,
     masses: MassBounds = None,
+    counterweight: Disc | Mapping[str, Disc] | None = None,
     remove: Sequence[str] = (),
     motions: Motions = (),
     limits: Mapping[str, npt.ArrayLike] | None = None,
@@ -89,6 +92,8 @@ def balance(
         masses: bounds (low, high) [kg] on the mass added to a body, or of a redesigned body; one for all or by body.
             A redesigned body keeps between half and twice its mass, and a body gets at most ten times the moving
             mass, unless given.
+        counterweight: discs that the added material must be makeable as, one kind for all bodies or by body; planar
+            mechanisms only. See `realise`.
         remove: bodies that material may also be taken from.
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
@@ -114,6 +119,7 @@ def balance(
             mode=mode,
             region=region,
             masses=masses,
+            counterweight=counterweight,
             remove=remove,
             motions=motions,
             limits=limits,
@@ -216,10 +222,16 @@ class BalanceProblem:
     ) -> tuple[Design | None, str]:
         """Make a solution exact and check it; None and the reason when it is not physical."""
         assert outcome.x is not None
-        y = self._exact(outcome.x[: self.n])
-        parts = _lift.lift(self, y)
-        if parts.lowest < -_PHYSICAL:
-            return None, f"a body is outside the physical ones by {-parts.lowest:.2g}, {_PHYSICAL:g} is allowed"
+        for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
+            y, residual = self._exact(outcome.x[: self.n], drop)
+            parts = _lift.lift(self, y)
+            if residual <= _EXACT and parts.lowest >= -_PHYSICAL:
+                break
+        else:
+            return None, (
+                f"the design misses the conditions by {residual:.2g} ({_EXACT:g} is allowed) and its least physical "
+                f"body is outside by {max(0.0, -parts.lowest):.2g} ({_PHYSICAL:g})"
+            )
         full = np.concatenate([y, np.zeros(len(self.terms))])
         values = {name: self.terms[base(name)].value(full) for name in weights}
         squared = {k: v * v if k.startswith("mean_square_") else v for k, v in values.items()}
@@ -231,6 +243,8 @@ class BalanceProblem:
             status="optimal",
             original=self.chain,
             kind=self.kind,
+            mode=self.mode,
+            space=self.space,
             conditions=self.conditions,
             objective=objective,
             dual_bound=dual,
@@ -242,15 +256,26 @@ class BalanceProblem:
         )
         return design, ""
 
-    def _exact(self, y: Array) -> Array:
-        """Move y onto the conditions by the smallest step, measured in shares of each body's own material."""
+    def _exact(self, y: Array, drop: float) -> tuple[Array, float]:
+        """Move y onto the conditions by the smallest step, measured in shares of each body's own material.
+
+        Args:
+            y: variables (n,).
+            drop: share of the moving mass below which material is left out altogether.
+
+        Returns:
+            The variables and the largest residual left, scaled.
+        """
         B = np.zeros((0, self.X0.size)) if self.conditions is None else self.conditions.basis
         A = np.concatenate([B @ self.E, self.fixed[:, :-1]])
         b = np.concatenate([B @ self.X0, -self.fixed[:, -1]])
-        share = np.concatenate([np.full(m.size, max(abs(float(y[m.start])), 1e-9)) for m in self.materials])
+        mass = np.array([abs(float(y[m.start])) for m in self.materials])
+        share = np.where(mass < drop, 0.0, np.maximum(mass, 1e-9))
+        share = np.repeat(share, [m.size for m in self.materials])
+        y = np.where(share > 0.0, y, 0.0)
         for _ in range(3 if A.size else 0):
             y = y - share * np.linalg.lstsq(A * share, A @ y + b, rcond=1e-10)[0]
-        return y
+        return y, float(np.abs(A @ y + b).max(initial=0.0))
 
     def _infeasible(self, outcome: Outcome) -> Design:
         nothing = np.full_like(self.chain.inertial_parameters, np.nan)
@@ -258,6 +283,8 @@ class BalanceProblem:
             status="infeasible",
             original=self.chain,
             kind=self.kind,
+            mode=self.mode,
+            space=self.space,
             conditions=self.conditions,
             objective=float("inf"),
             dual_bound=float("inf"),
@@ -276,6 +303,7 @@ def balance_problem(
     mode: Literal["add", "redesign"] = "add",
     region: Region | Mapping[str, Region] | None = None,
     masses: MassBounds = None,
+    counterweight: Disc | Mapping[str, Disc] | None = None,
     remove: Sequence[str] = (),
     motions: Motions = (),
     limits: Mapping[str, npt.ArrayLike] | None = None,
@@ -301,7 +329,7 @@ def balance_problem(
         own = space_of(chain, random_samples(chain, 50, near=near, seed=seed), space)
     setup = _Setup(chain, own, conditions, mode)
     setup.check_physical()
-    materials = setup.materials(setup.chosen(bodies), region, setup.removable(remove))
+    materials = setup.materials(setup.chosen(bodies), region, setup.removable(remove), counterweight)
     paths = trajectories(chain, motions, near)
     wanted = {measure_of(t) for t in (*objectives, *(limits or {}))} - {None}
     if paths:
@@ -464,13 +492,19 @@ class _Setup:
         return bool(np.abs(self.conditions.basis[:, body * w : (body + 1) * w]).max(initial=0.0) > 1e-9)
 
     def materials(
-        self, chosen: Sequence[int], region: Region | Mapping[str, Region] | None, removable: Sequence[int]
+        self,
+        chosen: Sequence[int],
+        region: Region | Mapping[str, Region] | None,
+        removable: Sequence[int],
+        counterweight: Disc | Mapping[str, Disc] | None,
     ) -> list[Material]:
         """Return the pieces of material that are variables."""
-        if isinstance(region, Mapping):
-            for name in region:
+        for given, what in ((region, "region"), (counterweight, "counterweight")):
+            for name in given if isinstance(given, Mapping) else ():
                 if name not in self.chain.joints:
-                    raise UnknownNameError("body of a region", name, self.chain.joints)
+                    raise UnknownNameError(f"body of a {what}", name, self.chain.joints)
+        if counterweight is not None and (self.mode != "add" or not self.space.planar):
+            raise InvalidInputError("counterweight", "Disc", "needs a planar mechanism and mode 'add'")
         out, start = [], 0
         word = "new body" if self.mode == "redesign" else "material added to"
         for bodies, sign, label in ((chosen, 1, word), (removable, -1, "material removed from")):
@@ -486,7 +520,9 @@ class _Setup:
                     planar=planar,
                     unit=self.space.length,
                 )
-                material = Material(b, sign, start, planar, shape, f"{label} {name}")
+                disc = counterweight.get(name) if isinstance(counterweight, Mapping) else counterweight
+                solid = disc.scaled(self.space.axes[b], self.mass, self.space.length) if disc and sign > 0 else None
+                material = Material(b, sign, start, planar, shape, f"{label} {name}", solid)
                 out.append(material)
                 start += material.size
         return out
