@@ -17,6 +17,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin._crossing import Crossing, cross, refine, singular_ahead
+from fivebar_pin._friction import Watch
 from fivebar_pin._motion_in_chart import Inputs, Motion, Node, State, failure, first_node, is_smooth, next_node
 from fivebar_pin._record import Interpolant, Record
 from fivebar_pin._system import System
@@ -25,6 +26,7 @@ from fivebar_pin.trajectory import Trajectory
 
 _RETRIES = 40
 _CROSS = 2.0  # time to a singular instant, in usual steps, from which on one step over it is tried
+_STILL = 100  # shortest number of steps over the whole time while some joint sticks: what acts must be looked at
 _GAP = 0.467  # middle of the widest gap between the stages of DOP853, where a singular instant does least harm
 
 
@@ -40,10 +42,9 @@ def run(
     progress: Callable[[float], None] | None,
 ) -> Trajectory:
     """Integrate from a state at times[0] and return the motion at all times (n,)."""
-    node, end = first_node(system, inputs, state, float(times[0])), float(times[-1])
+    steps = _Steps(system, inputs, state, float(times[0]), float(times[-1]), rtol, atol)
     record = Record(system, times)
-    record.put(0, node.point, node.v, node.a)
-    steps = _Steps(system, inputs, state.rank, node, end, rtol, atol)
+    record.put(0, steps.node.point, steps.node.v, steps.node.a)
     for _ in range(max_steps):
         if record.done == times.size:
             return record.trajectory(state.rank)
@@ -52,10 +53,10 @@ def run(
         record.fill(steps.motion, interpolant, node, steps.node)
         steps.accept()
         if progress is not None:
-            progress((steps.node.t - float(times[0])) / (end - float(times[0])))
+            progress((steps.node.t - float(times[0])) / float(times[-1] - times[0]))
     raise SolverError(
-        f"the simulation took {max_steps} steps to get to t = {steps.node.t:.6g} s of {end:.6g} s. The motion is stiff "
-        "or not smooth (dry friction at rest, very stiff springs): loosen rtol and atol, or raise max_steps."
+        f"the simulation took {max_steps} steps to get to t = {steps.node.t:.6g} s of {times[-1]:.6g} s. The motion is "
+        "stiff or not smooth (very stiff springs, a torque with jumps): loosen rtol and atol, or raise max_steps."
     )
 
 
@@ -68,15 +69,29 @@ class _Steps:
     """
 
     def __init__(
-        self, system: System, inputs: Inputs, rank: int, node: Node, end: float, rtol: float, atol: float
+        self, system: System, inputs: Inputs, state: State, start: float, end: float, rtol: float, atol: float
     ) -> None:
-        self.system, self.inputs, self.rank, self.end, self.rtol = system, inputs, rank, end, rtol
-        f = system.chain.nv - rank
+        self.system, self.inputs, self.rank, self.end, self.rtol = system, inputs, state.rank, end, rtol
+        f = system.chain.nv - state.rank
         self.atol = np.concatenate([np.full(f, atol + rtol), np.full(f, atol)])  # a chart may begin anywhere: unit 1
-        self.node, self.h = node, None
+        self.h: float | None = None
+        self._still = (end - start) / _STILL
+        self._watch = Watch(system, inputs, state.rank) if np.any(system.friction) else None
+        self.node = self._watch.start(state, start) if self._watch else first_node(system, inputs, state, start)
         self._recentre()
 
     def advance(self) -> Callable[[], Interpolant]:
+        """Take one step, at most to where friction changes, and return what gives its interpolant."""
+        interpolant = self._step()
+        if self._watch is None:
+            return interpolant
+        way = interpolant()
+        event = self._watch.event(self.motion, way, self.node)
+        if event is not None:
+            self.node, self._solver = self._watch.start(*event), None
+        return lambda: way
+
+    def _step(self) -> Callable[[], Interpolant]:
         """Take one step and return what gives its interpolant."""
         crossed = self._crossed()
         if crossed is not None:
@@ -85,6 +100,8 @@ class _Steps:
         for _ in range(_RETRIES):
             solver = self._solver = self._solver or self._start()
             solver.max_step = _longest(self.node, solver.h_abs)
+            if self.motion.mode is not None and self.motion.mode.stuck.size:
+                solver.max_step = min(solver.max_step, self._still)
             message = solver.step()
             if solver.status == "failed":
                 raise failure(self.node, self.rank, message or "")
@@ -116,7 +133,8 @@ class _Steps:
 
     def _recentre(self) -> None:
         chart = self.system.manifold.chart_at(self.node.point, self.rank)
-        self.motion, self._solver = Motion(self.system, self.inputs, self.rank, chart, self.node), None
+        mode = self._watch.mode if self._watch else None
+        self.motion, self._solver = Motion(self.system, self.inputs, self.rank, chart, self.node, mode), None
 
     def _start(self) -> Any:
         from scipy.integrate import DOP853

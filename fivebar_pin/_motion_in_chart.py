@@ -10,7 +10,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin._manifold import Chart, Point
-from fivebar_pin._system import System, Wrench
+from fivebar_pin._system import Mode, System, Wrench
 from fivebar_pin.errors import SingularityError, SolverError
 
 _TURNED = 0.7  # cosine between chart and tangent space at which the chart is changed
@@ -72,8 +72,11 @@ class Node:
 class Motion:
     """The right-hand side in one chart, around one node."""
 
-    def __init__(self, system: System, inputs: Inputs, rank: int, chart: Chart, node: Node) -> None:
+    def __init__(
+        self, system: System, inputs: Inputs, rank: int, chart: Chart, node: Node, mode: Mode | None = None
+    ) -> None:
         self.system, self.inputs, self.rank, self.chart, self.node = system, inputs, rank, chart, node
+        self.mode = mode
 
     def start(self) -> Array:
         """Return (xi, u) at the node."""
@@ -93,9 +96,11 @@ class Motion:
             v = T @ np.linalg.solve(self.chart.B.T @ T, y[f:]) * manifold.scale
         except np.linalg.LinAlgError:
             return None
+        if self.mode is not None:
+            v[self.mode.stuck] = 0.0
         applied = self.inputs.applied(self.system, point, t, v)
         with np.errstate(all="ignore"):
-            a = self.system.accelerations(point, v[None], applied, self.rank)[0]
+            a = self.system.accelerations(point, v[None], applied, self.rank, self.mode)[0]
         return (point, v, a) if np.all(np.isfinite(a)) else None
 
     def rate(self, t: float, y: Array) -> Array:
@@ -124,9 +129,10 @@ class Motion:
         return bool(np.abs(away).max() > _FAR)
 
 
-def first_node(system: System, inputs: Inputs, state: State, t: float) -> Node:
+def first_node(system: System, inputs: Inputs, state: State, t: float, mode: Mode | None = None) -> Node:
+    """Return the node of a state that begins a stretch of smooth motion."""
     applied = inputs.applied(system, state.point, t, state.v)
-    a = system.accelerations(state.point, state.v[None], applied, state.rank)[0]
+    a = system.accelerations(state.point, state.v[None], applied, state.rank, mode)[0]
     return Node(t, state.point, state.v, a, np.zeros_like(a), sigma_of(state.point, state.rank), np.inf)
 
 
@@ -183,7 +189,7 @@ def failure(node: Node, rank: int, reason: str) -> SingularityError | SolverErro
         return error
     return SolverError(
         f"the simulation stops at t = {node.t:.6g} s: {reason.strip().rstrip('.')}. The motion is not smooth or too "
-        "stiff there: look at tau, the springs and dry friction at rest, or loosen rtol and atol."
+        "stiff there: look at tau and the springs, or loosen rtol and atol."
     )
 
 

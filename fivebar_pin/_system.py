@@ -33,6 +33,36 @@ _FEW = 6  # up to here one Pinocchio call per sample beats the batch
 _MASSLESS = 1e-13  # smallest to largest eigenvalue of the reduced inertia below which it counts as singular [-]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Mode:
+    """What dry friction does.
+
+    Attributes:
+        sense: sign of the velocity of the joints that slip, else zero (nv,).
+        stuck: joints that stick (k,).
+    """
+
+    sense: Array
+    stuck: npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equations:
+    """Reduced equations of motion, inertia w = force and a = N w + held, over a batch.
+
+    Attributes:
+        N: tangent space of the closures (n, nv, f).
+        inertia: N^T M N (n, f, f).
+        force: (n, f).
+        held: accelerations that hold the loops closed (n, nv).
+    """
+
+    N: Array
+    inertia: Array
+    force: Array
+    held: Array
+
+
 @dataclass(frozen=True, eq=False)
 class System:
     """A chain with its springs, ready to give accelerations.
@@ -64,7 +94,7 @@ class System:
             model.createData(),
         )
 
-    def accelerations(self, point: Point, v: Array, applied: Array, rank: int) -> Array:
+    def accelerations(self, point: Point, v: Array, applied: Array, rank: int, mode: Mode | None = None) -> Array:
         """Return the joint accelerations (n, nv).
 
         Args:
@@ -72,11 +102,24 @@ class System:
             v: velocities that keep them closed (n, nv).
             applied: generalised forces of motors and from outside (n, nv) [N m or N].
             rank: of the closures.
+            mode: what dry friction does; the sign of v says it otherwise.
         """
+        sense = np.sign(v) if mode is None else mode.sense
+        eq = self.equations(point, v, applied - self.friction * sense, rank)
+        free = _solve_inertia(eq.inertia, eq.force[..., None])
+        if mode is not None and mode.stuck.size:
+            E = eq.N[:, mode.stuck]
+            yields = _solve_inertia(eq.inertia, np.swapaxes(E, 1, 2))
+            excess = np.matmul(E, free) + eq.held[:, mode.stuck, None]
+            free = free - np.matmul(yields, np.matmul(np.linalg.pinv(np.matmul(E, yields), rcond=1e-10), excess))
+        return np.asarray(eq.held + np.matmul(eq.N, free)[..., 0])
+
+    def equations(self, point: Point, v: Array, applied: Array, rank: int) -> Equations:
+        """Return the reduced equations of motion at states (n); dry friction must be among the applied forces."""
         loops, scale = self.manifold.loops, self.manifold.scale
         M, bias = self._mass_and_bias(point.q, v)
         N = np.swapaxes(point.Vt[:, rank:], 1, 2) * scale[:, None]  # (n, nv, f)
-        force = applied - bias - self.damping * v - self.friction * np.sign(v)
+        force = applied - bias - self.damping * v
         if self.springs:
             force = force + self.spring_forces(point, v).force
         held = np.zeros_like(v)
@@ -86,8 +129,7 @@ class System:
             held = -np.einsum("nrk,nr->nk", point.Vt[:, :rank], along) * scale
         force = force - np.matmul(M, held[..., None])[..., 0]
         NT = np.swapaxes(N, 1, 2)
-        free = _solve_inertia(np.matmul(NT, np.matmul(M, N)), np.matmul(NT, force[..., None]))
-        return np.asarray(held + np.matmul(N, free)[..., 0])
+        return Equations(N, np.matmul(NT, np.matmul(M, N)), np.matmul(NT, force[..., None])[..., 0], held)
 
     def spring_forces(self, point: Point, v: Array) -> SpringForces:
         """Return what the springs do at states (n)."""

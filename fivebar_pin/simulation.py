@@ -42,8 +42,9 @@ def forward_dynamics(
 ) -> Array:
     """Compute the joint accelerations of the closed chain, a = N w + a_c with (N^T M N) w = N^T (...).
 
-    Gravity, armature, viscous damping and dry friction are taken from the chain's model. The mechanism may have any
-    number of motors: the tangent space of the closures is used, not the actuated joints.
+    Gravity, armature, viscous damping and dry friction are taken from the chain's model; dry friction is -f sign(v),
+    none at rest, as in `inverse_dynamics` (`simulate` lets joints stick). The mechanism may have any number of motors:
+    the tangent space of the closures is used, not the actuated joints.
 
     Args:
         chain: the mechanism.
@@ -94,6 +95,9 @@ def simulate(
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Integrate the motion of the mechanism from a given state.
+
+    Forces are as in `forward_dynamics`. Joints with dry friction slip or stick; the instants at which they change are
+    found, and joints at rest are settled together by Gauss's principle.
 
     Args:
         chain: the mechanism, with any number of motors.

@@ -343,6 +343,28 @@ def test_initial_state_is_moved_onto_the_closures_when_asked():
     np.testing.assert_allclose(again.v, motion.v, atol=1e-12)
 
 
+SHIPPED = [name for name in fb.io.shipped() if fb.load(fb.io.shipped_path(name)).closures]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_mechanisms_fall_freely(name):
+    """From their home, let go at speed: torque returned by the inverse, energy kept, loops closed."""
+    chain = fb.load(fb.io.shipped_path(name)).with_gravity(GRAVITY)
+    home = next(iter(chain.references.values()))
+    at = [chain.model.joints[chain.model.getJointId(j)].idx_q for j in chain.actuated]
+    q = fb.assemble(chain, home[at], near=home)
+    rng = np.random.default_rng(4)
+    v = fb.complement(chain, q) @ rng.uniform(0.5, 1.0, chain.na)
+    tau = rng.normal(size=chain.na)
+    a = forward_dynamics(chain, q, v, tau)
+    np.testing.assert_allclose(fb.inverse_dynamics(chain, still(chain, q, v, a)).torque[0], tau, atol=1e-10)
+    motion = simulate(chain, q, v, None, np.linspace(0.0, 0.3, 7))
+    balance = energy_balance(chain, motion)
+    assert balance.drift() < 1e-9
+    assert balance.residual() < 1e-9
+    assert motion.worst_closure < 1e-12
+
+
 # ---------------------------------------------------------------------------------------------- springs
 
 
@@ -423,6 +445,69 @@ def test_external_force_that_follows_the_state():
     by_force = simulate(chain, q, v, None, t, external={"tip_left": pull})
     by_spring = simulate(chain, q, v, None, t, springs=[Spring("tip_left", "universe", 20.0, 0.0)])
     np.testing.assert_allclose(by_force.q, by_spring.q, atol=1e-9)
+
+
+# ---------------------------------------------------------------------------------------------- dry friction
+
+
+def with_dry_friction(chain: fb.ClosedChain, friction: float) -> fb.ClosedChain:
+    """Return the chain with the same dry friction on every joint."""
+    model = chain.model.copy()
+    model.upperDryFrictionLimit = np.full(model.nv, friction)
+    model.lowerDryFrictionLimit = -model.upperDryFrictionLimit
+    return fb.ClosedChain(model, chain.closures, chain.actuated)
+
+
+def test_dry_friction_takes_the_same_from_every_swing_and_then_holds():
+    """Every half swing is harmonic about -+ f / k, until the spring cannot move it: 1, -2/3, 1/3, 0."""
+    chain, k, f, inertia = with_dry_friction(pendulum(), 0.5), 3.0, 0.5, 1.0 / 3.0
+    half = np.pi / np.sqrt(k / inertia)
+    t = np.linspace(0.0, 4.0 * half, 41)
+    motion = simulate(chain, [1.0], [0.0], None, t, springs=[JointSpring("hinge", k, 0.0)])
+    swing = np.minimum(t // half, 3)
+    start = np.maximum(1.0 - 2.0 * swing * f / k, 0.0)
+    side = (-1.0) ** swing
+    about = np.where(swing < 3, f / k, 0.0)
+    expected = side * (about + (start - about) * np.cos(np.pi * (t / half - swing)))
+    expected[swing == 3] = 0.0
+    np.testing.assert_allclose(motion.q[:, 0], expected, atol=1e-9)
+    np.testing.assert_array_equal(motion.v[-5:], 0.0)
+
+
+def test_a_joint_breaks_loose_when_the_torque_exceeds_its_friction():
+    """tau = 0.4 t against f = 0.5: at rest until t = 1.25 s, then q = 0.2 (t - 1.25)^3."""
+    t = np.linspace(0.0, 3.0, 31)
+    motion = simulate(with_dry_friction(pendulum(), 0.5), [0.0], [0.0], lambda t, q, v: [0.4 * t], t)
+    np.testing.assert_allclose(motion.q[:, 0], 0.2 * np.maximum(t - 1.25, 0.0) ** 3, atol=1e-9)
+
+
+def test_a_linkage_comes_to_rest_by_friction_joint_by_joint():
+    """Energy only falls, its account is kept, and in the end everything stands still without gravity."""
+    chain = with_dry_friction(mechanisms.five_bar(), 2.0).with_gravity(np.zeros(3))
+    q, v = state_of(chain)
+    motion = simulate(chain, q, 3.0 * v, None, np.linspace(0.0, 1.5, 151))
+    balance = energy_balance(chain, motion)
+    partly = np.any(motion.v == 0.0, axis=1) & np.any(motion.v != 0.0, axis=1)
+    assert partly.any(), "no joint stuck before the others"
+    assert balance.residual() < 1e-9
+    assert np.all(np.diff(balance.total) <= 1e-12)
+    np.testing.assert_array_equal(motion.v[-1], 0.0)
+    assert motion.worst_closure < 1e-12
+
+
+def test_a_joint_may_stick_while_the_rest_of_the_mechanism_moves():
+    """Friction on one joint of two mobilities: held at rest, the five-bar moves as a four-bar does."""
+    chain = mechanisms.five_bar()
+    model = chain.model.copy()
+    held = chain.joints.index("right")
+    model.upperDryFrictionLimit = np.where(np.arange(4) == held, 1e3, 0.0)
+    sticky = fb.ClosedChain(model, chain.closures, chain.actuated)
+    q, _ = state_of(chain)
+    v = fb.complement(chain, q) @ np.array([1.0, 0.0])
+    motion = simulate(sticky, q, v, None, np.linspace(0.0, 1.0, 11))
+    np.testing.assert_allclose(motion.q[:, held], q[held], atol=1e-10)
+    assert np.ptp(motion.q[:, 0]) > 0.1
+    assert energy_balance(sticky, motion).drift() < 1e-9
 
 
 # ---------------------------------------------------------------------------------------------- failures
