@@ -160,9 +160,7 @@ class ClosedChain:
     def with_inertial_parameters(self, parameters: npt.ArrayLike) -> ClosedChain:
         """Return the same mechanism with the given inertial parameters (njoints - 1, 10)."""
         pi = checked("inertial parameters", parameters, (self.model.njoints - 1, 10))
-        return self.with_inertias(
-            {j: pin.Inertia.FromDynamicParameters(row) for j, row in zip(self.joints, pi, strict=True)}
-        )
+        return self.with_inertias({j: _inertia(j, row) for j, row in zip(self.joints, pi, strict=True)})
 
     def with_gravity(self, gravity: npt.ArrayLike) -> ClosedChain:
         """Return the same mechanism under another gravity (3,) [m/s2]."""
@@ -185,6 +183,18 @@ def find_frame(model: pin.Model, name: str) -> pin.Frame:
     if not found:
         raise UnknownNameError("frame", name, [frame.name for frame in model.frames])
     return next((frame for frame in found if frame.type != pin.FrameType.JOINT), found[0])
+
+
+def _inertia(joint: str, pi: Array) -> pin.Inertia:
+    """Return ten parameters as an inertia; Pinocchio divides by the mass, which a massless body does not have."""
+    if pi[0] != 0.0:
+        return pin.Inertia.FromDynamicParameters(np.array(pi))
+    if pi[1:4].any():
+        raise InvalidInputError(
+            f"first moment of the body of joint {joint}", pi[1:4].tolist(), "must be zero, as its mass"
+        )
+    I = np.array([[pi[4], pi[5], pi[7]], [pi[5], pi[6], pi[8]], [pi[7], pi[8], pi[9]]])
+    return pin.Inertia(0.0, np.zeros(3), I)
 
 
 def _check_tree(model: pin.Model) -> None:
