@@ -6,7 +6,8 @@ from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditio
 from fivebar_pin.balancing.counterweights import MATERIALS, Counterweight, Realisation, realise
 from fivebar_pin.balancing.design import Certificate, Change, Design
 from fivebar_pin.balancing.front import Comparison, ParetoFront, alici_shirinzadeh, compare, pareto
-from fivebar_pin.balancing.problem import BalanceProblem, balance, balance_problem
+from fivebar_pin.balancing.optimum import balance
+from fivebar_pin.balancing.problem import BalanceProblem, balance_problem
 from fivebar_pin.balancing.regions import Ball, Box, Disc, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
 from fivebar_pin.balancing.scoring import Scores, score

@@ -29,7 +29,7 @@ class Branch:
 
 
 def branches(
-    chain: ClosedChain, together: BalanceConditions, *, tries: int = 6, seed: int = 0, **options: Any
+    chain: ClosedChain, together: BalanceConditions, *, tries: int = 4, seed: int = 0, **options: Any
 ) -> tuple[Branch, ...]:
     """Return the branches found that have fewer conditions than all assembly modes together, fewest first.
 

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, frozen
 from fivebar_pin.balancing._terms import check_terms
 from fivebar_pin.balancing.design import Design
-from fivebar_pin.balancing.problem import BalanceProblem, Motions, balance, balance_problem
+from fivebar_pin.balancing.optimum import balance
+from fivebar_pin.balancing.problem import BalanceProblem, Motions, balance_problem
 from fivebar_pin.balancing.scoring import score
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InfeasibleError, InvalidInputError

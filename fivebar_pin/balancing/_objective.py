@@ -1,0 +1,90 @@
+"""Objectives and upper bounds of a balancing problem, from their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.balancing._conic import Block
+from fivebar_pin.balancing._quantities import Rows, reflected_inertia
+from fivebar_pin.balancing._setup import Setup
+from fivebar_pin.balancing._terms import (
+    LINEAR,
+    Term,
+    base,
+    check_terms,
+    linear_term,
+    measure_of,
+    positive_limit,
+    rows_term,
+    torque_limits,
+)
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TermMaker:
+    """Builds terms and limits over designs X = X0 + E y (scaled) and pi = pi0 + full_E y."""
+
+    chain: ClosedChain
+    setup: Setup
+    rows: dict[str, Rows]
+    paths: tuple[Trajectory, ...]
+    E: Array
+    X0: Array
+    full_E: Array
+    pi0: Array
+
+    def make(self, name: str) -> Term:
+        """Return a term by its base name."""
+        present = self.chain.inertial_parameters.reshape(-1)
+        if name in LINEAR:
+            weight = np.zeros(present.size)
+            weight[::10] = 1.0
+            if name == "inertia":
+                if not self.paths:
+                    raise InvalidInputError("motions", [], "must hold at least one motion for inertia")
+                weight = reflected_inertia(self.chain, self.paths)
+            now = float(weight @ present)
+            constant = float(weight @ self.pi0) - (now if name == "added_mass" else 0.0)
+            return linear_term(name, weight @ self.full_E, constant, abs(now) or 1.0)
+        if name == "distance":
+            X = self.setup.space.of(self.chain.inertial_parameters).reshape(-1) / self.setup.unit
+            return Term(name, ((self.E, self.X0 - X),), False, 1.0)
+        measured = measure_of(name)
+        assert measured is not None
+        return rows_term(name, self.rows[measured], self.full_E, self.pi0, present)
+
+    def limits(self, limits: Mapping[str, npt.ArrayLike]) -> list[Block]:
+        """Return the cones of all upper bounds."""
+        blocks: list[Block] = []
+        for name, top in limits.items():
+            if name == "peak_torque":
+                blocks += torque_limits(top, self.rows["torque"], self.full_E, self.pi0)
+            else:
+                limit = positive_limit(name, float(np.asarray(top)))
+                root = np.sqrt(limit) if name.startswith("mean_square_") else limit
+                blocks += self.make(base(name)).bounded(float(root))
+        return blocks
+
+
+def weights_of(minimise: str | Mapping[str, float] | None, mode: str) -> dict[str, float]:
+    """Return the terms and their weights, checked."""
+    if minimise is None:
+        minimise = "distance" if mode == "redesign" else "added_mass"
+    weights = {minimise: 1.0} if isinstance(minimise, str) else {str(k): float(v) for k, v in minimise.items()}
+    if not weights:
+        raise InvalidInputError("minimise", {}, "must name at least one term")
+    check_terms(weights, "objective")
+    for name, weight in weights.items():
+        if not (np.isfinite(weight) and weight >= 0.0):
+            raise InvalidInputError(f"weight of {name}", weight, "must be finite and not negative")
+    if not any(weights.values()):
+        raise InvalidInputError("minimise", weights, "must have a positive weight")
+    return weights

@@ -1,0 +1,221 @@
+"""Names and bounds of a balancing problem turned into pieces of material and cones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fivebar_pin._arrays import Array, checked
+from fivebar_pin.balancing import _lift
+from fivebar_pin.balancing._conic import Block
+from fivebar_pin.balancing._material import Material
+from fivebar_pin.balancing._parameters import Space
+from fivebar_pin.balancing.conditions import BalanceConditions
+from fivebar_pin.balancing.regions import Ball, Disc, Region, resolve
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InvalidInputError, UnknownNameError
+
+MassBounds = tuple[float, float] | Mapping[str, tuple[float, float]] | None
+CAP = 10.0  # largest mass added to one body unless given [moving masses]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Setup:
+    """Names and bounds turned into materials and cones, lengths in chain lengths and masses in moving masses."""
+
+    chain: ClosedChain
+    space: Space
+    conditions: BalanceConditions | None
+    mode: str
+
+    @property
+    def mass(self) -> float:
+        """Unit of mass [kg]."""
+        return self.chain.mass or 1.0
+
+    @property
+    def unit(self) -> Array:
+        """Unit of every parameter of the space (nb * width,)."""
+        return np.asarray(self.space.scale * self.mass)
+
+    def present(self) -> Array:
+        """Return the present scaled parameters (nb, width)."""
+        x = self.space.of(self.chain.inertial_parameters).reshape(-1) / self.unit
+        return np.asarray(x.reshape(-1, self.space.width))
+
+    def check_physical(self) -> None:
+        """Raise when a present body could not exist."""
+        for name, x in zip(self.chain.joints, self.present(), strict=True):
+            lowest = _lift.lowest_eigenvalue(x, planar=self.space.planar)
+            if lowest < -1e-9 and self.mode == "add":
+                raise InvalidInputError(
+                    f"inertia of body {name}",
+                    [float(v) for v in self.space.of(self.chain.inertial_parameters)[self.chain.joints.index(name)]],
+                    f"is not that of a physical body (pseudo-inertia has the eigenvalue {lowest:.3g}, scaled)",
+                    "Correct the model, or redesign the body.",
+                )
+
+    def chosen(self, bodies: Sequence[str] | None) -> list[int]:
+        """Return the indices of the bodies that may change."""
+        joints = self.chain.joints
+        if bodies is None:
+            found = [b for b in range(len(joints)) if self._influences(b)]
+            if not found:
+                raise InvalidInputError("bodies", list(joints), f"cannot influence the {self._kind} conditions")
+            return found
+        if isinstance(bodies, str) or not len(bodies):
+            raise InvalidInputError("bodies", bodies, "must be a sequence of at least one name")
+        for name in bodies:
+            if name not in joints:
+                raise UnknownNameError("body", name, joints)
+        idle = [name for name in bodies if not self._influences(joints.index(name))]
+        if idle:
+            raise InvalidInputError("bodies", idle, f"cannot influence the {self._kind} conditions")
+        return sorted({joints.index(name) for name in bodies})
+
+    def removable(self, remove: Sequence[str]) -> list[int]:
+        """Return the indices of the bodies that may lose material."""
+        for name in remove:
+            if name not in self.chain.joints:
+                raise UnknownNameError("body", name, self.chain.joints)
+        if remove and self.mode == "redesign":
+            raise InvalidInputError("remove", list(remove), "has no meaning for a redesign")
+        return sorted(self.chain.joints.index(name) for name in remove)
+
+    @property
+    def _kind(self) -> str:
+        return self.conditions.kind if self.conditions is not None else "given"
+
+    def _influences(self, body: int) -> bool:
+        if self.conditions is None:
+            return True
+        w = self.space.width
+        return bool(np.abs(self.conditions.basis[:, body * w : (body + 1) * w]).max(initial=0.0) > 1e-9)
+
+    def materials(
+        self,
+        chosen: Sequence[int],
+        region: Region | Mapping[str, Region] | None,
+        removable: Sequence[int],
+        counterweight: Disc | Mapping[str, Disc] | None,
+    ) -> list[Material]:
+        """Return the pieces of material that are variables."""
+        for given, what in ((region, "region"), (counterweight, "counterweight")):
+            for name in given if isinstance(given, Mapping) else ():
+                if name not in self.chain.joints:
+                    raise UnknownNameError(f"body of a {what}", name, self.chain.joints)
+        if counterweight is not None and (self.mode != "add" or not self.space.planar):
+            raise InvalidInputError("counterweight", "Disc", "needs a planar mechanism and mode 'add'")
+        out, start = [], 0
+        word = "new body" if self.mode == "redesign" else "material added to"
+        for bodies, sign, label in ((chosen, 1, word), (removable, -1, "material removed from")):
+            for b in bodies:
+                name = self.chain.joints[b]
+                own = region.get(name) if isinstance(region, Mapping) else region
+                planar = self.space.planar
+                shape = resolve(
+                    own or Ball(self.chain.length),
+                    self.chain,
+                    b,
+                    self.space.axes[b],
+                    planar=planar,
+                    unit=self.space.length,
+                )
+                disc = counterweight.get(name) if isinstance(counterweight, Mapping) else counterweight
+                solid = disc.scaled(self.space.axes[b], self.mass, self.space.length) if disc and sign > 0 else None
+                material = Material(b, sign, start, planar, shape, f"{label} {name}", solid)
+                out.append(material)
+                start += material.size
+        return out
+
+    def map(self, materials: Sequence[Material]) -> tuple[Array, Array]:
+        """Return E, X0 with scaled parameters = X0 + E y."""
+        X0 = self.present()
+        w = self.space.width
+        E = np.zeros((X0.size, sum(m.size for m in materials)))
+        for m in materials:
+            E[m.body * w : (m.body + 1) * w, m.parameters] = m.sign * np.eye(w)
+            if self.mode == "redesign":
+                X0[m.body] = 0.0
+        return E, X0.reshape(-1)
+
+    def constraints(
+        self,
+        materials: Sequence[Material],
+        E: Array,
+        X0: Array,
+        masses: MassBounds,
+    ) -> list[Block]:
+        """Return conditions, physical bodies, regions and mass bounds."""
+        n = E.shape[1]
+        blocks = []
+        if self.conditions is not None and self.conditions.rank:
+            R = self.conditions.rows
+            labels = tuple(f"[{text}]" for text in self.conditions.equations)
+            blocks.append(Block(labels, "zero", R @ E, R @ X0))
+        w = self.space.width
+        for m in materials:
+            blocks += m.blocks(n)
+            if m.sign < 0:  # what is left of a body is a body
+                left = Material(m.body, 1, m.start, m.planar, None, "").blocks(n)[0]
+                own = left.G[:, m.parameters] @ X0[m.body * w : (m.body + 1) * w]
+                label = f"what is left of {self.chain.joints[m.body]} is a physical body"
+                blocks.append(Block(label, left.cone, -left.G, own, left.inward))
+        for m in materials:
+            if m.sign > 0:
+                blocks += self._mass_bounds(m, masses, n)
+        return blocks
+
+    def caps(self, materials: Sequence[Material], masses: MassBounds, n: int) -> list[Block]:
+        """Return bounds on added masses that have none of their own; without them an optimum need not exist."""
+        out = []
+        for m in materials:
+            if m.sign > 0 and self._bounds(m, masses) is None:
+                label = f"mass of {m.label} <= {CAP:g} times the moving mass"
+                out.append(Block(label, "nonneg", -_unit_row(m.start, n), np.array([CAP])))
+        return out
+
+    def fixed(self, materials: Sequence[Material], masses: MassBounds, n: int) -> Array:
+        """Return rows (k, n + 1) of masses that are given exactly: row @ y = last entry."""
+        out = np.zeros((0, n + 1))
+        for m in materials:
+            bounds = self._bounds(m, masses) if m.sign > 0 else None
+            if bounds is not None and bounds[0] == bounds[1]:
+                out = np.vstack([out, np.append(_unit_row(m.start, n)[0], bounds[0] / self.mass)])
+        return out
+
+    def _mass_bounds(self, m: Material, masses: MassBounds, n: int) -> list[Block]:
+        bounds = self._bounds(m, masses)
+        if bounds is None:
+            return []  # see caps
+        (low, high), row = bounds, _unit_row(m.start, n)
+        if low == high:
+            return [Block(f"mass of {m.label} = {low:g} kg", "zero", row, np.array([-low / self.mass]))]
+        return [
+            Block(f"mass of {m.label} >= {low:g} kg", "nonneg", row, np.array([-low / self.mass])),
+            Block(f"mass of {m.label} <= {high:g} kg", "nonneg", -row, np.array([high / self.mass])),
+        ]
+
+    def _bounds(self, m: Material, masses: MassBounds) -> tuple[float, float] | None:
+        """Return the bounds on the mass of one material [kg], or None."""
+        name = self.chain.joints[m.body]
+        if isinstance(masses, Mapping):
+            for key in masses:
+                if key not in self.chain.joints:
+                    raise UnknownNameError("body of a mass bound", key, self.chain.joints)
+        given = masses.get(name) if isinstance(masses, Mapping) else masses
+        if given is None:
+            present = float(self.chain.inertial_parameters[m.body, 0])
+            return None if self.mode == "add" else (0.5 * present, 2.0 * present)
+        low, high = (float(v) for v in checked(f"masses of {name}", given, (2,)))
+        if not 0.0 <= low <= high:
+            raise InvalidInputError(f"masses of {name}", (low, high), "must be 0 <= low <= high [kg]")
+        return low, high
+
+
+def _unit_row(k: int, n: int) -> Array:
+    row = np.zeros((1, n))
+    row[0, k] = 1.0
+    return row
