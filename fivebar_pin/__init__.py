@@ -23,17 +23,20 @@ from fivebar_pin.dynamics import Loads, inverse_dynamics
 from fivebar_pin.errors import FiveBarPinError
 from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
 from fivebar_pin.motion import Motion
-from fivebar_pin.simulation import JointSpring, Spring, forward_dynamics, simulate
+from fivebar_pin.simulation import JointSpring, Spring, energy_balance, forward_dynamics, simulate
 from fivebar_pin.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from fivebar_pin import balancing, io, paper, viz
+    from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.io import load, save
 
 __all__ = [
+    "BalanceConditions",
     "ClosedChain",
     "Closure",
     "ClosureKind",
+    "Design",
     "Diagnosis",
     "FiveBarPinError",
     "JointSpring",
@@ -44,24 +47,38 @@ __all__ = [
     "Visual",
     "assemble",
     "assembly_modes",
+    "balance",
+    "balance_conditions",
     "balancing",
     "closure_residual",
     "complement",
     "diagnose",
     "drive",
+    "energy_balance",
     "forward_dynamics",
     "inverse_dynamics",
     "io",
     "load",
     "motion",
     "paper",
+    "pareto",
     "save",
+    "score",
     "simulate",
     "viz",
 ]
 
 _PACKAGES = ("balancing", "io", "paper", "viz")
-_LATE = {"load": "io", "save": "io"}
+_LATE = {
+    "BalanceConditions": "balancing",
+    "Design": "balancing",
+    "balance": "balancing",
+    "balance_conditions": "balancing",
+    "load": "io",
+    "pareto": "balancing",
+    "save": "io",
+    "score": "balancing",
+}
 
 
 def __getattr__(name: str) -> Any:
