@@ -5,9 +5,10 @@
     chain = fb.load("robot.urdf")                       # open tree + sidecar with the loop closures
     trajectory = fb.drive(chain, motion)                # the whole mechanism from its actuated joints
     loads = fb.inverse_dynamics(chain, trajectory)      # torque, shaking force and moment, reactions
+    design = fb.balance(chain, "force")                 # the optimal mass distribution, or the proof of none
 
-Sub-packages, imported when first used: `fb.paper` (the planar five-bar in closed form), `fb.balancing`, `fb.io`,
-`fb.viz`.
+Sub-packages: `fb.paper` (the planar five-bar in closed form), `fb.balancing`, `fb.io`, `fb.viz`. What describes a
+mechanism is imported at once; everything else when it is first used, so that importing stays cheap.
 """
 
 from __future__ import annotations
@@ -18,18 +19,18 @@ from typing import TYPE_CHECKING, Any
 from fivebar_pin import motion
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure, ClosureKind
-from fivebar_pin.diagnosis import Diagnosis, diagnose
-from fivebar_pin.dynamics import Loads, inverse_dynamics
 from fivebar_pin.errors import FiveBarPinError
-from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
 from fivebar_pin.motion import Motion
-from fivebar_pin.simulation import JointSpring, Spring, energy_balance, forward_dynamics, simulate
 from fivebar_pin.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from fivebar_pin import balancing, io, paper, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
+    from fivebar_pin.diagnosis import Diagnosis, diagnose
+    from fivebar_pin.dynamics import Loads, inverse_dynamics
     from fivebar_pin.io import load, save
+    from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
+    from fivebar_pin.simulation import JointSpring, Spring, energy_balance, forward_dynamics, simulate
 
 __all__ = [
     "BalanceConditions",
@@ -68,22 +69,27 @@ __all__ = [
     "viz",
 ]
 
-_PACKAGES = ("balancing", "io", "paper", "viz")
 _LATE = {
-    "BalanceConditions": "balancing",
-    "Design": "balancing",
-    "balance": "balancing",
-    "balance_conditions": "balancing",
-    "load": "io",
-    "pareto": "balancing",
-    "save": "io",
-    "score": "balancing",
+    "balancing": ("BalanceConditions", "Design", "balance", "balance_conditions", "pareto", "score"),
+    "diagnosis": ("Diagnosis", "diagnose"),
+    "dynamics": ("Loads", "inverse_dynamics"),
+    "io": ("load", "save"),
+    "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive"),
+    "paper": (),
+    "simulation": ("JointSpring", "Spring", "energy_balance", "forward_dynamics", "simulate"),
+    "viz": (),
 }
 
 
 def __getattr__(name: str) -> Any:
-    if name in _PACKAGES:
-        return importlib.import_module(f"fivebar_pin.{name}")
-    if name in _LATE:
-        return getattr(importlib.import_module(f"fivebar_pin.{_LATE[name]}"), name)
+    for room, names in _LATE.items():
+        if name == room or name in names:
+            module = importlib.import_module(f"fivebar_pin.{room}")
+            found = module if name == room else getattr(module, name)
+            globals()[name] = found
+            return found
     raise AttributeError(f"module 'fivebar_pin' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

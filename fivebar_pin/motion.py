@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -165,6 +164,8 @@ def from_file(path: str | Path) -> Motion:
 
     The part after q_, v_, a_ is free but must agree; the order is that of the q columns.
     """
+    import csv
+
     file = Path(path)
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
