@@ -356,6 +356,15 @@ def test_bad_requests_are_refused_with_what_is_known() -> None:
         problem.solve("distance")
 
 
+def test_a_motion_that_leaves_the_range_says_where() -> None:
+    chain, path = case_I()
+    t = np.linspace(0.0, 1.0, 11)
+    away = fb.motion.combine(fb.motion.constant(t, 0.0), fb.motion.polynomial(t, path.q[0, 0], np.pi))
+    far = chain.with_actuated(("theta_psi", "gamma"))
+    with pytest.raises((fb.errors.AssemblyError, fb.errors.SingularityError), match="sample"):
+        balance(far, "force", motions=away, near=path.q[0])
+
+
 def test_a_solver_that_is_not_installed_names_its_package(monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 

@@ -17,6 +17,8 @@ from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditio
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import FiveBarPinError
 
+__all__ = ["Branch", "branches"]
+
 _ROUGH = 1e-2  # part of a condition outside another row space that tells branches apart [-]
 
 
