@@ -40,7 +40,9 @@ class Settled:
     sticks: bool
 
 
-def settle(system: System, point: Point, v: Array, applied: Array, rank: int, resting: Array) -> Settled:
+def settle(
+    system: System, point: Point, v: Array, applied: Array, rank: int, resting: npt.NDArray[np.bool_]
+) -> Settled:
     """Decide which joints at rest stick, and which way the others start.
 
     Args:

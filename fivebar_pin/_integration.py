@@ -140,7 +140,8 @@ class _Steps:
         from scipy.integrate import DOP853
 
         h = None if self.h is None else min(self.h, self.end - self.node.t)
-        return DOP853(
+        made: Any = DOP853  # its stubs know scalar tolerances only
+        return made(
             self.motion.rate, self.node.t, self.motion.start(), self.end, rtol=self.rtol, atol=self.atol, first_step=h
         )
 

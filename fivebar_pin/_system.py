@@ -217,7 +217,7 @@ def _solve_inertia(inertia: Array, force: Array) -> Array:
         unit = inertia / (size[:, :, None] * size[:, None, :])
         least = float(np.linalg.eigvalsh(unit)[:, 0].min())
         if least > _MASSLESS:
-            return np.linalg.solve(unit, force / size[..., None]) / size[..., None]
+            return np.asarray(np.linalg.solve(unit, force / size[..., None]) / size[..., None])
     raise InvalidInputError(
         "inertia of the free motion",
         "singular",
