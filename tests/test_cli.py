@@ -114,3 +114,83 @@ def test_wrong_words_exit_with_two() -> None:
     """A wrong command line is exit code 2 with usage, from a real process."""
     done = subprocess.run([sys.executable, "-m", "fivebar_pin", "dance"], capture_output=True, text=True, check=False)
     assert done.returncode == 2 and "usage" in done.stderr
+
+
+def test_loads_prints_checks_and_writes_named_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Any mechanism along a motion file: units follow the joints, the table holds what the library computes."""
+    chain = fb.load(fb.io.shipped_path("slider_crank"))
+    t = np.linspace(0.0, 1.0, 51)
+    start = float(chain.references["home"][chain.model.idx_qs[chain.model.getJointId("crank")]])
+    motion = fb.motion.cycloidal(t, start, start + 1.0)
+    fb.motion.to_file(motion, tmp_path / "m.csv", chain.actuated)
+    out = tmp_path / "out"
+    assert main(["loads", "slider_crank", "--motion", str(tmp_path / "m.csv"), "--out", str(out)]) == 0
+    assert "rate of energy" in capsys.readouterr().out
+    header = (out / "loads.csv").read_text().splitlines()[0].split(",")
+    data = dict(zip(header, np.loadtxt(out / "loads.csv", delimiter=",", skiprows=1).T, strict=True))
+    assert {"q slider [m]", "v crank [rad/s]", "tau crank [N m]", "F x [N]"} <= set(header)
+    loads = fb.inverse_dynamics(chain, fb.drive(chain, motion))
+    np.testing.assert_allclose(data["tau crank [N m]"], loads.torque[:, 0], rtol=0, atol=1e-15)
+    assert (out / "animation.html").exists() and (out / "torques.png").exists()
+
+
+def test_simulate_reports_the_energy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Free motion from rest under gravity keeps its energy and moves."""
+    words = ["simulate", "four_bar_crank_rocker", "--time", "0.5", "--samples", "26", "--gravity", "0", "-9.81", "0"]
+    assert main([*words, "--out", str(tmp_path / "o")]) == 0
+    assert "total energy" in capsys.readouterr().out
+    motion = np.loadtxt(tmp_path / "o" / "motion.csv", delimiter=",", skiprows=1)
+    assert motion.shape[0] == 26 and np.ptp(motion[:, 1]) > 0.1
+
+
+def test_simulate_refuses_a_span_without_sense(capsys: pytest.CaptureFixture[str]) -> None:
+    """A negative time is one line that names it."""
+    assert main(["simulate", "slider_crank", "--time", "-1"]) == 1
+    assert "--time = -1.0 but must be positive" in capsys.readouterr().err
+
+
+def test_conditions_prints_the_rank(capsys: pytest.CaptureFixture[str]) -> None:
+    """Six force conditions for the five-bar, eleven with the moment."""
+    assert main(["conditions", "five_bar_case_I"]) == 0
+    assert "rank 6" in capsys.readouterr().out
+    assert main(["conditions", "five_bar_case_I", "--kind", "dynamic"]) == 0
+    assert "rank 11" in capsys.readouterr().out
+
+
+def test_balance_writes_a_balanced_mechanism(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """0.27 kg balance case I; what is written balances after it has been read back."""
+    words = ["balance", "five_bar_case_I", "--radius", "0.1", "--out", str(tmp_path / "o")]
+    assert main(words) == 0
+    assert "+0.27 kg" in capsys.readouterr().out
+    chain = fb.load(tmp_path / "o" / "five_bar_case_I_balanced.urdf").with_gravity((0.0, 0.0, 0.0))
+    loads = fb.inverse_dynamics(chain, fb.drive(chain, fb.paper.default_motion(samples=21)))
+    assert np.abs(loads.shaking_force).max() < 1e-12
+    assert main(words) == 1
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_balance_says_when_it_is_impossible(capsys: pytest.CaptureFixture[str]) -> None:
+    """Dynamic balance by added material is impossible there: exit code 1 and the certificate."""
+    assert main(["balance", "five_bar_case_I", "--kind", "dynamic", "--radius", "0.1"]) == 1
+    said = capsys.readouterr().out
+    assert "infeasible" in said and "certificate" in said
+
+
+def test_balance_refuses_words_it_does_not_know(capsys: pytest.CaptureFixture[str]) -> None:
+    """Unknown terms list the known ones; a limit needs a number."""
+    assert main(["balance", "five_bar_case_I", "--minimise", "beauty"]) == 1
+    assert "added_mass" in capsys.readouterr().err
+    assert main(["balance", "five_bar_case_I", "--limit", "peak_torque=much"]) == 1
+    assert "NAME=NUMBER" in capsys.readouterr().err
+
+
+def test_pareto_writes_the_front(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Along the front the first objective rises and the second falls."""
+    file = tmp_path / "front.csv"
+    words = ["pareto", "five_bar_case_I", "added_mass", "rms_torque", "--radius", "0.1", "--points", "4"]
+    assert main([*words, "--out", str(file)]) == 0
+    front = np.loadtxt(file, delimiter=",", skiprows=1)
+    assert front.shape == (4, 2)
+    assert np.all(np.diff(front[:, 0]) > 0.0) and np.all(np.diff(front[:, 1]) < 0.0)
+    assert main([*words, "--out", str(file)]) == 1
+    assert "exists already" in capsys.readouterr().err
