@@ -18,6 +18,7 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import SolverError
 
+_LISTED = 8  # conflicts written out in a message
 ROOT2 = float(np.sqrt(2.0))
 # The programs come well scaled, so the solver's own equilibration is left out at first; the others are for the rest.
 _ATTEMPTS: tuple[dict[str, object], ...] = (
@@ -64,7 +65,8 @@ class Certificate:
     conflict: dict[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        listed = "; ".join(self.conflict)
+        names = list(self.conflict)
+        listed = "; ".join(names[:_LISTED]) + (f"; and {len(names) - _LISTED} more" if len(names) > _LISTED else "")
         return (
             f"no solution (Farkas certificate checked: |G^T z| = {self.stationarity:.1e}, outside the dual cone by "
             f"{self.violation:.1e}); in conflict: {listed}"

@@ -163,6 +163,8 @@ class Setup:
                 own = left.G[:, m.parameters] @ X0[m.body * w : (m.body + 1) * w]
                 label = f"what is left of {self.chain.joints[m.body]} is a physical body"
                 blocks.append(Block(label, left.cone, -left.G, own, left.inward))
+                half = 0.5 * X0[m.body * w : m.body * w + 1]
+                blocks.append(Block(f"{m.label} <= half its mass", "nonneg", -unit_row(m.start, n), half))
         for m in materials:
             if m.sign > 0:
                 blocks += self._mass_bounds(m, masses, n)
@@ -174,7 +176,7 @@ class Setup:
         for m in materials:
             if m.sign > 0 and self._bounds(m, masses) is None:
                 label = f"mass of {m.label} <= {CAP:g} times the moving mass"
-                out.append(Block(label, "nonneg", -_unit_row(m.start, n), np.array([CAP])))
+                out.append(Block(label, "nonneg", -unit_row(m.start, n), np.array([CAP])))
         return out
 
     def fixed(self, materials: Sequence[Material], masses: MassBounds, n: int) -> Array:
@@ -183,14 +185,14 @@ class Setup:
         for m in materials:
             bounds = self._bounds(m, masses) if m.sign > 0 else None
             if bounds is not None and bounds[0] == bounds[1]:
-                out = np.vstack([out, np.append(_unit_row(m.start, n)[0], bounds[0] / self.mass)])
+                out = np.vstack([out, np.append(unit_row(m.start, n)[0], bounds[0] / self.mass)])
         return out
 
     def _mass_bounds(self, m: Material, masses: MassBounds, n: int) -> list[Block]:
         bounds = self._bounds(m, masses)
         if bounds is None:
             return []  # see caps
-        (low, high), row = bounds, _unit_row(m.start, n)
+        (low, high), row = bounds, unit_row(m.start, n)
         if low == high:
             return [Block(f"mass of {m.label} = {low:g} kg", "zero", row, np.array([-low / self.mass]))]
         return [
@@ -215,7 +217,8 @@ class Setup:
         return low, high
 
 
-def _unit_row(k: int, n: int) -> Array:
+def unit_row(k: int, n: int) -> Array:
+    """Return e_k as a row (1, n)."""
     row = np.zeros((1, n))
     row[0, k] = 1.0
     return row

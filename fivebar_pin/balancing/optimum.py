@@ -57,7 +57,7 @@ def balance(
             mass, unless given.
         counterweight: discs that the added material must be makeable as, one kind for all bodies or by body; planar
             mechanisms only. See `realise`.
-        remove: bodies that material may also be taken from.
+        remove: bodies that material may also be taken from, up to half of their mass.
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
         gravity, about, near, space, seed: as for `balance_conditions`.
