@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import inverse_dynamics
@@ -32,6 +33,11 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     _designing(balance)
     balance.add_argument("--minimise", action="append", metavar="TERM[=WEIGHT]", help="what to minimise; repeatable")
     balance.add_argument("--limit", action="append", metavar="TERM=VALUE", help="upper bound on a term; repeatable")
+    balance.add_argument("--realise", choices=("disc", "bar", "ball"), help="make counterweights of this shape")
+    balance.add_argument("--material", default="steel", help="of the counterweights: a name, or kg/m3 [steel]")
+    balance.add_argument(
+        "--thickness", type=float, help="of flat counterweights [m]; a fifth of the mechanism's length"
+    )
     balance.add_argument("--out", metavar="FOLDER", help="write the design, the curves and a page before / after there")
     balance.add_argument("--overwrite", action="store_true", help="replace files that exist already")
     balance.add_argument("--view", action="store_true", help="open the live view before / after (Ctrl-C ends it)")
@@ -76,10 +82,11 @@ def run_balance(chosen: argparse.Namespace) -> int:
     if not design.feasible:
         console.print(repr(design), markup=False, soft_wrap=True)
         return 1
-    pair = _moving(design, trajectory)
-    _print_design(console, design, pair)
+    after = _realised(console, design, chosen)
+    pair = _moving(design, after, trajectory)
+    _print_design(console, design, after, pair)
     if folder is not None:
-        for file in _write(folder, design, trajectory, pair, overwrite=chosen.overwrite):
+        for file in _write(folder, design, after, trajectory, pair, overwrite=chosen.overwrite):
             console.print(f"  {file}", markup=False)
     if chosen.view:
         from fivebar_pin import viz
@@ -151,7 +158,23 @@ def _title(design: Any) -> str:
     return f"{design.original.name}: {design.kind} balance (weight left out of the force)"
 
 
-def _print_design(console: Any, design: Any, pair: list[Any]) -> None:
+def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedChain:
+    """Return the designed mechanism, with counterweights that can be made when they are asked for."""
+    chain: ClosedChain = design.chain
+    if not chosen.realise:
+        return chain
+    from fivebar_pin.balancing import realise
+
+    try:
+        material: str | float = float(chosen.material)
+    except ValueError:
+        material = chosen.material
+    made = realise(design, shape=chosen.realise, material=material, thickness=chosen.thickness)
+    console.print(str(made), markup=False, soft_wrap=True)
+    return made.chain
+
+
+def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]) -> None:
     changes = [("added", c) for c in design.added] + [("removed", c) for c in design.removed]
     rows = [
         [word, c.body, f"{c.mass:.6g}", ", ".join(f"{x + 0.0:.5g}" for x in np.round(c.place, 12)), _inertia(c)]
@@ -162,7 +185,7 @@ def _print_design(console: Any, design: Any, pair: list[Any]) -> None:
     _tables.table(console, title, ("", "body of joint", "mass [kg]", "at [m], joint axes", "Izz at its centre"), rows)
     t = pair[0].trajectory.t
     rows = []
-    for name, curves in _curves(design, pair).items():
+    for name, curves in _curves(design, after, pair).items():
         cells = [_tables.number(x) for c in curves for x in (_tables.peak(c), _tables.rms(c, t))]
         rows.append([name, *cells])
     _tables.table(
@@ -180,21 +203,21 @@ def _inertia(change: Any) -> str:
     return _tables.number(float(change.inertia[2, 2]))
 
 
-def _moving(design: Any, trajectory: Trajectory) -> list[Any]:
+def _moving(design: Any, after: ClosedChain, trajectory: Trajectory) -> list[Any]:
     """Return before and after for the viewer, with the loads of inertia alone: weight does not shake."""
     from fivebar_pin.viz import Shown
 
     out = []
-    for label, chain in (("before", design.original), ("after", design.chain)):
+    for label, chain in (("before", design.original), ("after", after)):
         weightless = chain.with_gravity((0.0, 0.0, 0.0))
         out.append(Shown(weightless, trajectory, inverse_dynamics(weightless, trajectory), label))
     return out
 
 
-def _curves(design: Any, pair: list[Any]) -> dict[str, list[Array]]:
+def _curves(design: Any, after: ClosedChain, pair: list[Any]) -> dict[str, list[Array]]:
     """Return the curves to compare: torques with gravity, shaking force and moment without the weight."""
     trajectory = pair[0].trajectory
-    whole = [inverse_dynamics(chain, trajectory) for chain in (design.original, design.chain)]
+    whole = [inverse_dynamics(chain, trajectory) for chain in (design.original, after)]
     curves: dict[str, list[Array]] = {}
     for k, name in enumerate(design.original.actuated):
         unit = "N" if _output.joint_unit(design.original, name) == "m" else "N m"
@@ -204,19 +227,21 @@ def _curves(design: Any, pair: list[Any]) -> dict[str, list[Array]]:
     return curves
 
 
-def _write(folder: Path, design: Any, trajectory: Trajectory, pair: list[Any], *, overwrite: bool) -> list[Path]:
+def _write(
+    folder: Path, design: Any, after: ClosedChain, trajectory: Trajectory, pair: list[Any], *, overwrite: bool
+) -> list[Path]:
     from fivebar_pin import io, viz
 
-    files = list(io.save(design.chain, folder, name=f"{design.original.name}_balanced", overwrite=overwrite))
+    files = list(io.save(after, folder, name=f"{design.original.name}_balanced", overwrite=overwrite))
     columns = _output.motion_columns(design.original, trajectory)
-    for label, chain in (("before", design.original), ("after", design.chain)):
+    for label, chain in (("before", design.original), ("after", after)):
         loads = inverse_dynamics(chain, trajectory)
         columns += [(f"{label} {name}", x) for name, x in _output.load_columns(chain, loads)]
     files.append(_output.write_columns(folder / "results.csv", columns))
     inertial = {one.label: one.loads for one in pair}
     whole = {
         "before": inverse_dynamics(design.original, trajectory),
-        "after": inverse_dynamics(design.chain, trajectory),
+        "after": inverse_dynamics(after, trajectory),
     }
     t = trajectory.t
     figures = {
