@@ -1,4 +1,4 @@
-"""Balance the paper's five-bar four ways and see what each costs: the paper's optimum, counterweights, redesign, limits.
+"""Balance the paper's five-bar in several ways and see what each costs.
 
 python demos/balance_five_bar.py             # live view in the browser
 python demos/balance_five_bar.py --headless  # numbers only
@@ -50,9 +50,8 @@ def main():
     for mass, torque in front.values:
         print(f"    {mass:.4f} kg added: RMS torque {torque:.4f} N m")
     whole = fb.balance(chain, "dynamic", region=region)
-    print(
-        f"\nwith the moment as well: {whole.status}; the proof combines {len(whole.certificate.conflict)} conditions and bounds"
-    )
+    proof = len(whole.certificate.conflict)
+    print(f"\nwith the moment as well: {whole.status}; the proof combines {proof} conditions and bounds")
     if not headless:
         viz.view(shown, speed=SPEED, title="Case I: what balance costs")
 
