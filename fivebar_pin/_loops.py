@@ -63,6 +63,7 @@ class PassiveMap:
         X: per group, pseudo-inverse of the passive columns of its reduced rows (n, np_g, r_g); nan where singular.
         sigma: lower estimate of their smallest singular value, scaled [-] (n,).
         sign: sign of their determinant, per group; one where they are not square (n, groups).
+        tall: those that are not square, scaled (n, r_g, np_g): see `same_side`.
         size: number of passive and actuated coordinates.
     """
 
@@ -70,6 +71,7 @@ class PassiveMap:
     X: list[Array]
     sigma: Array
     sign: Array
+    tall: list[Array]
     size: tuple[int, int]
 
     def solve(self, rows: Array) -> Array:
@@ -208,7 +210,7 @@ class Loops:
     def passive_map(self, blocks: list[Array]) -> PassiveMap:
         """Invert the passive columns of the Jacobian's blocks. Singular samples get sigma = 0 and X = nan."""
         n = blocks[0].shape[0] if blocks else 1
-        X, sigma, sign = [], np.full(n, 1.0), np.ones((n, len(self._groups)))
+        X, tall, sigma, sign = [], [], np.full(n, 1.0), np.ones((n, len(self._groups)))
         for k, (g, J) in enumerate(zip(self._groups, blocks, strict=True)):
             Jp = np.matmul(g.reduce, J[:, :, g.passive_columns]) * g.scale
             if g.is_square:
@@ -218,11 +220,12 @@ class Loops:
                     smallest = 1.0 / np.sqrt(np.einsum("nij,nij->n", inverted, inverted))
             else:
                 inverted, smallest = _pseudo_inverse(Jp)
+                tall.append(Jp)
             X.append(g.scale[:, None] * inverted)
             if g.passive.size:
                 smallest = np.where(np.isfinite(smallest), smallest, 0.0)
                 sigma = smallest if len(self._groups) == 1 else np.minimum(sigma, smallest)
-        return PassiveMap(self._groups, X, sigma, sign, (self.passive.size, self.actuated.size))
+        return PassiveMap(self._groups, X, sigma, sign, tall, (self.passive.size, self.actuated.size))
 
     def rank(self, J: Array, *, tolerance: float = RANK_TOLERANCE) -> int:
         """Return the rank of one closure Jacobian (m, nv), scaled so that lengths and units do not matter."""
@@ -322,12 +325,28 @@ def loops_of(chain: ClosedChain) -> Loops:
 def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
     """Make the error for a configuration that does not close."""
     name, size = loops.worst(residual)
+    tied = ""
+    if loops.r > loops.passive.size:
+        tied = (
+            f" With {loops.r} closure rows for {loops.passive.size} passive coordinates the closures may tie the "
+            "actuated joints to each other, so that only some combinations close: diagnose(chain) lists the sets "
+            "that are free."
+        )
     return AssemblyError(
         f"the mechanism cannot be assembled {where}: closure {name} stays open by {size:.3g} m or rad. "
-        "Bring the actuated coordinates within reach, or check the link lengths.",
+        f"Bring the actuated coordinates within reach, or check the link lengths.{tied}",
         closure=name,
         residual=size,
     )
+
+
+def same_side(before: list[Array], after: list[Array]) -> npt.NDArray[np.bool_]:
+    """Tell whether no singularity lies between tall matrices (..., r, k): square ones show it in their determinant.
+
+    A column combination that passes through zero turns round, which makes det(A^T B) negative.
+    """
+    sides = [np.linalg.det(np.matmul(np.swapaxes(A, -1, -2), B)) > 0.0 for A, B in zip(before, after, strict=True)]
+    return np.asarray(np.all(sides, axis=0))
 
 
 def _pseudo_inverse(M: Array) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin._loops import Loops, open_message
+from fivebar_pin._loops import Loops, open_message, same_side
 from fivebar_pin._newton import Closed, closed_enough, polish, residual_of, search
 from fivebar_pin.errors import AssemblyError, BranchError, SingularityError
 
@@ -15,8 +15,10 @@ LONGEST = 0.4  # longest predictor step of any coordinate [rad, or chain lengths
 SINGULAR = 1e-7  # scaled smallest singular value below which the passive motion counts as undetermined [-]
 _SHORTEST = 1e-7  # fraction of a step below which the search for a way on is given up
 _TRUST = 0.3  # largest correction, as a fraction of the step that was predicted
+_DROP = 0.2  # part of the singular value that a step must leave: a longer one may jump over a bifurcation unseen [-]
 _CORRECTIONS = 6  # Newton steps before a step counts as too long
 _GUIDED = 1e-6  # scaled residual good enough for a node on the way [-]
+_RESOLVED = 1e-2  # the same over the squared singular value: a residual r cannot tell branches sqrt(r) apart [-]
 
 
 @dataclass(slots=True)
@@ -28,6 +30,7 @@ class _Node:
     N: Array  # (np, na)
     bend: Array  # change of N per unit of the last step (np, na)
     sign: Array  # of the passive determinant, per group of closures
+    tall: list[Array]  # passive Jacobians of the groups without a determinant (r, k)
     sigma: float
 
 
@@ -39,6 +42,7 @@ class _Corrector:
     step: Array  # passive tangent of a Newton step (np,)
     N: Array
     sign: Array  # per group of closures
+    tall: list[Array]
     sigma: float
 
 
@@ -50,14 +54,19 @@ def _correct(loops: Loops, q: Array) -> _Corrector:
     residual = loops.residual(pairs) if loops.m else np.zeros((1, 0))
     error = float(np.abs(residual * loops.row_scale).max(initial=0.0))
     return _Corrector(
-        error, -passive.solve(residual)[0], passive.complement(blocks)[0], passive.sign[0], float(passive.sigma[0])
+        error,
+        -passive.solve(residual)[0],
+        passive.complement(blocks)[0],
+        passive.sign[0],
+        [A[0] for A in passive.tall],
+        float(passive.sigma[0]),
     )
 
 
 def node_at(loops: Loops, q: Array, x: Array) -> _Node:
     """Prepare a closed configuration q (nq,) with actuated coordinates x (na,)."""
     here = _correct(loops, q[None])
-    return _Node(np.array(x), np.array(q), here.N, np.zeros_like(here.N), here.sign, here.sigma)
+    return _Node(np.array(x), np.array(q), here.N, np.zeros_like(here.N), here.sign, here.tall, here.sigma)
 
 
 def follow(loops: Loops, node: _Node, target: Array) -> _Node:
@@ -139,14 +148,14 @@ def _try(loops: Loops, node: _Node, x: Array) -> _Node | None:
         return None
     q = loops.tree.integrate(node.q[None], tangent[None])
     _set_actuated(loops, q, x[None])
-    correction = 0.0
+    correction, least = 0.0, max(SINGULAR, _DROP * node.sigma)
     for _ in range(_CORRECTIONS):
         here = _correct(loops, q)
-        if np.any(here.sign != node.sign) or not here.sigma >= SINGULAR:
+        if np.any(here.sign != node.sign) or not here.sigma >= least or not same_side(node.tall, here.tall):
             return None
-        if here.error < _GUIDED:
+        if here.error < min(_GUIDED, _RESOLVED * here.sigma**2):
             bend = (here.N - node.N) / length if length > 0.0 else node.bend
-            return _Node(np.array(x), q[0], here.N, bend, here.sign, here.sigma)
+            return _Node(np.array(x), q[0], here.N, bend, here.sign, here.tall, here.sigma)
         step = np.zeros(loops.tree.nv)
         step[loops.passive] = here.step
         correction += float(np.abs(step / scale).max())
@@ -168,9 +177,18 @@ def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, toleran
         & (closed.sigma >= SINGULAR)
     )
     trusted &= closed.correction <= _TRUST * LONGEST
+    if nodes[0].tall:
+        trusted &= _on_the_side_of(loops, nodes, np.searchsorted(index, np.arange(n), side="right") - 1, closed.q)
     if trusted.all():
         return closed
     return _mend(loops, index, nodes, X, closed, trusted, tolerance) if n else closed
+
+
+def _on_the_side_of(loops: Loops, nodes: list[_Node], which: np.ndarray, q: Array) -> np.ndarray:
+    """Tell whether every sample q (n, nq) lies on the side of its node where no determinant tells it (n,)."""
+    poses = loops.tree.poses(q)
+    tall = loops.passive_map(loops.blocks(poses, loops.pairs(poses))).tall
+    return same_side([np.stack([node.tall[g] for node in nodes])[which] for g in range(len(tall))], tall)
 
 
 def _mend(

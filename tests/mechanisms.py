@@ -215,6 +215,23 @@ def bennett() -> tuple[fb.ClosedChain, np.ndarray]:
     return fb.ClosedChain(model, (closure,), ("first",)), q
 
 
+def spherical_four_bar(arcs: Sequence[float], *, kind: str = "3d", base: pin.SE3 = AT_ORIGIN) -> fb.ClosedChain:
+    """Return a spherical four-bar of the given arcs (crank, coupler, rocker, ground) [rad], driven at the crank.
+
+    Its closure has three rows that are independent off the sphere for two passive coordinates.
+    """
+    a, b, c, d = arcs
+    out = at(z=0.5)
+    model = pin.Model()
+    model.name = "spherical_four_bar"
+    crank = add(model, 0, pin.JointModelRZ(), base, "crank", body(1))
+    coupler = add(model, crank, pin.JointModelRZ(), at(rpy=(a, 0.0, 0.0)), "coupler", body(2))
+    rocker = add(model, 0, pin.JointModelRZ(), base * at(rpy=(d, 0.0, 0.0)), "rocker", body(3))
+    point(model, coupler, "coupler_end", at(rpy=(b, 0.0, 0.0)) * out)
+    point(model, rocker, "rocker_end", at(rpy=(c, 0.0, 0.0)) * out)
+    return fb.ClosedChain(model, (fb.Closure(("coupler_end", "rocker_end"), kind, name="pin"),), ("crank",))
+
+
 def double_four_bar() -> fb.ClosedChain:
     """Return the double four-bar: three uprights 1 m apart, two couplers, uniform rods of 1 m and 1 kg, two loops.
 

@@ -18,6 +18,7 @@ from mechanisms import (
     rscr,
     rssr,
     slider_crank,
+    spherical_four_bar,
     welded_four_bar,
 )
 
@@ -317,6 +318,52 @@ def test_motion_through_a_singularity_is_refused_however_it_is_sampled(n):
     assert abs(info.value.sample - crossing) <= 1
     assert info.value.time == motion.t[info.value.sample]
     assert info.value.sigma < 1e-2
+
+
+@pytest.mark.parametrize("chain", [parallelogram(), four_bar((0.4, 0.4, 1.1, 1.1)), four_bar((0.2, 1.0, 0.2, 1.0))])
+def test_no_sampling_takes_a_motion_over_a_bifurcation(chain):
+    """A whole turn of a change-point four-bar passes where two modes meet: no step may land beyond it unseen."""
+    for n in range(6, 46):
+        crank = 0.7 + np.linspace(0.0, 2.0 * np.pi, n) + 0.013 * n
+        motion = Motion(np.linspace(0.0, 1.0, n), crank[:, None], np.full((n, 1), 2.0 * np.pi), np.zeros((n, 1)))
+        for mode in fb.assembly_modes(chain, crank[:1], starts=12):
+            with pytest.raises(SingularityError, match="type 2 singularity"):
+                fb.drive(chain, motion, mode)
+
+
+@pytest.mark.parametrize("kind", ["3d", "revolute"])
+@pytest.mark.parametrize("arcs", [(0.5, 1.0, 0.5, 1.0), (0.6, 0.6, 1.1, 1.1), (0.6, 1.1, 1.1, 0.6)])
+def test_a_loop_with_more_rows_than_passive_coordinates_is_not_taken_over_a_bifurcation(kind, arcs):
+    """The passive Jacobian of a spherical four-bar is tall: a change of mode must show without a determinant."""
+    chain = spherical_four_bar(arcs, kind=kind, base=TILTED)
+    for n in (9, 20, 41, 100):
+        start = fb.assembly_modes(chain, [0.4])[0]
+        with pytest.raises(SingularityError, match="type 2 singularity"):
+            fb.drive(chain, turning(0.4, 0.4 + 2.0 * np.pi, n), start)
+
+
+@pytest.mark.parametrize("n", [9, 100])
+def test_spherical_crank_rocker_turns_on_one_mode(n):
+    """The crank makes a whole turn; the sense of (coupler axis, pin, rocker axis) never changes and it comes back."""
+    arcs = (0.5, 1.2, 1.0, 1.1)
+    chain = spherical_four_bar(arcs, base=TILTED)
+    moved = fb.drive(chain, turning(0.4, 0.4 + 2.0 * np.pi, n), fb.assembly_modes(chain, [0.4])[0])
+    poses = loops_of(chain).tree.poses(moved.q)
+    pin_axis = poses.R[2] @ np.array([0.0, -np.sin(arcs[1]), np.cos(arcs[1])])
+    sense = np.einsum("ni,ni->n", np.cross(poses.R[2][:, :, 2], pin_axis), poses.R[3][:, :, 2])
+    assert np.abs(sense).min() > 0.1
+    assert np.all(np.sign(sense) == np.sign(sense[0]))
+    np.testing.assert_allclose(np.cos(moved.q[-1]), np.cos(moved.q[0]), atol=1e-12)
+
+
+def test_motors_tied_to_each_other_are_suspected_when_the_loop_stays_open():
+    """Crank and rocker both driven: only one rocker angle fits, and the error says that motors may be in the way."""
+    chain = four_bar().with_actuated(["crank", "rocker"])
+    moved = fb.drive(four_bar(), swinging(1.0))
+    own = Motion(moved.t, moved.q[:, [0, 2]], moved.v[:, [0, 2]], moved.a[:, [0, 2]])
+    wrong = Motion(moved.t, own.q + np.array([0.0, 0.3]), own.v, own.a)
+    with pytest.raises(AssemblyError, match=r"2 closure rows for 1 passive .* tie the actuated joints to each other"):
+        fb.drive(chain, wrong)
 
 
 @pytest.mark.parametrize("mode", [0, 1])
