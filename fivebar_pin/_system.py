@@ -23,7 +23,7 @@ from fivebar_pin._arrays import Array, checked
 from fivebar_pin._manifold import Manifold, Point, manifold_of
 from fivebar_pin._mass import depth_first, mass_matrix
 from fivebar_pin._springs import JointSpring, Spring, SpringForces
-from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -169,8 +169,9 @@ class System:
     @cached_property
     def _frames(self) -> list[tuple[int, int]]:
         """Frame numbers of every closure."""
-        find = self.chain.model.getFrameId
-        return [(find(c.frames[0]), find(c.frames[1])) for c in self.chain.closures]
+        model = self.chain.model
+        found = [[find_frame(model, name) for name in c.frames] for c in self.chain.closures]
+        return [(model.getFrameId(f.name, f.type), model.getFrameId(g.name, g.type)) for f, g in found]
 
     def _mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the mass matrix, armature included (n, nv, nv), and Coriolis plus gravity torques (n, nv)."""

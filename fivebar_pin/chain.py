@@ -16,6 +16,8 @@ from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["ClosedChain", "Visual"]
 
+_JOINT_FRAMES = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visual:
@@ -182,7 +184,7 @@ def find_frame(model: pin.Model, name: str) -> pin.Frame:
     found = [frame for frame in model.frames if frame.name == name]
     if not found:
         raise UnknownNameError("frame", name, [frame.name for frame in model.frames])
-    return next((frame for frame in found if frame.type != pin.FrameType.JOINT), found[0])
+    return next((frame for frame in found if frame.type not in _JOINT_FRAMES), found[0])
 
 
 def _inertia(joint: str, pi: Array) -> pin.Inertia:

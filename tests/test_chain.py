@@ -10,7 +10,7 @@ import pytest
 from mechanisms import AT_ORIGIN, add, at, body, double_four_bar, five_bar, point, rscr, slider_crank
 
 import fivebar_pin as fb
-from fivebar_pin.chain import Visual
+from fivebar_pin.chain import Visual, find_frame
 from fivebar_pin.errors import FiveBarPinError, InvalidInputError, UnknownNameError
 
 
@@ -164,6 +164,8 @@ def test_a_frame_name_shared_by_link_and_joint_means_the_link():
     model = pin.Model()
     one = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "arm")
     two = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "leg")
+    for joint in (one, two):
+        model.appendBodyToJoint(joint, body(joint), pin.SE3.Identity())
     model.addFrame(pin.Frame("arm", one, 0, pin.SE3.Identity(), pin.FrameType.JOINT))
     out = pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
     model.addFrame(pin.Frame("arm", one, 0, out, pin.FrameType.BODY))
@@ -171,3 +173,15 @@ def test_a_frame_name_shared_by_link_and_joint_means_the_link():
     chain = fb.ClosedChain(model, (fb.Closure(("arm", "leg_tip")),), ("arm",))
     np.testing.assert_allclose(fb.closure_residual(chain, np.array([0.3, 0.3])), 0.0, atol=1e-15)
     assert np.abs(fb.closure_residual(chain, np.array([0.3, 0.0]))).max() > 0.2
+    states = fb.simulate(chain, np.array([0.3, 0.3]), np.zeros(2), [0.1], np.linspace(0.0, 0.5, 3), initial="check")
+    assert states.worst_closure < 1e-12
+
+
+def test_a_link_wins_over_a_fixed_joint_of_its_name():
+    """The frame of a name is the link's, even where a fixed joint elsewhere has that name and comes first."""
+    model = pin.Model()
+    one = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "arm")
+    out = pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    model.addFrame(pin.Frame("tip", one, 0, pin.SE3.Identity(), pin.FrameType.FIXED_JOINT), False)
+    model.addFrame(pin.Frame("tip", one, 0, out, pin.FrameType.BODY), False)
+    np.testing.assert_array_equal(find_frame(model, "tip").placement.translation, [1.0, 0.0, 0.0])

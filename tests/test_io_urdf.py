@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from fivebar_pin import io, paper
+from fivebar_pin import closure_residual, io, paper
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure
@@ -236,3 +236,31 @@ def test_the_order_inside_a_pair_does_not_matter(tmp_path: Path) -> None:
     assert "[[O3_link2, O3_link3]]" in text
     sidecar.write_text(text.replace("[[O3_link2, O3_link3]]", "[[O3_link3, O3_link2]]").replace("3d", "3D"))
     assert io.load(urdf).closures[0].frames == ("O3_link3", "O3_link2")
+
+
+def test_closure_frames_named_like_their_joints_survive_the_files(tmp_path):
+    """A link and its joint may share a name: the link's frame closes the loop, in memory and after save and load."""
+    model = four_bar_names()
+    chain = ClosedChain(model, (Closure(("tip", "end")),), ("crank",))
+    io.save(chain, tmp_path)
+    for file in sorted(tmp_path.iterdir()):
+        if file.suffix in (".urdf", ".xml"):
+            again = io.load(file)
+            q = np.array([0.3, -0.2, 1.1])
+            np.testing.assert_allclose(closure_residual(again, q), closure_residual(chain, q), atol=1e-12)
+
+
+def four_bar_names() -> pin.Model:
+    """Return a four-bar whose links, joints and fixed joints share their names, as many exporters write them."""
+    model = pin.Model()
+    joint = 0
+    for name, parent, x, tip in (("crank", 0, 0.0, None), ("coupler", 1, 0.4, "tip"), ("rocker", 0, 1.0, "end")):
+        at = pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
+        joint = model.addJoint(parent, pin.JointModelRZ(), at, name)
+        model.appendBodyToJoint(joint, random_inertia(np.random.default_rng(joint)), pin.SE3.Identity())
+        link = model.addBodyFrame(name, joint, pin.SE3.Identity(), model.addJointFrame(joint))
+        if tip:
+            out = pin.SE3(np.eye(3), np.array([0.9, 0.0, 0.0]))
+            fixed = model.addFrame(pin.Frame(tip, joint, link, out, pin.FrameType.FIXED_JOINT))
+            model.addBodyFrame(tip, joint, out, fixed)
+    return model

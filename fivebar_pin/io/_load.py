@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import checked
-from fivebar_pin.chain import ClosedChain, Visual
+from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
@@ -176,18 +176,18 @@ def make_chain(
 
 
 def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
-    """Refuse closure frames that do not exist, are ambiguous, or lie on one body."""
-    poses: dict[str, list[pin.Frame]] = {}
+    """Refuse closure frames that do not exist, are ambiguous (a link's name never is), or lie on one body."""
+    frames: dict[str, list[pin.Frame]] = {}
     for frame in model.frames:
-        poses.setdefault(frame.name, []).append(frame)
+        frames.setdefault(frame.name, []).append(frame)
     for k, closure in enumerate(closures):
         for name in closure.frames:
-            if name not in poses:
-                raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, poses)}")
-            if len(poses[name]) > 1:
-                problem = f"the name {name!r} stands for {len(poses[name])} frames (links, joints); rename one"
-                raise FileFormatError(file, f"{key}[{k}]: {problem}")
-        joints = [poses[name][0].parentJoint for name in closure.frames]
+            if name not in frames:
+                raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, frames)}")
+            same = [f for f in frames[name] if f.type not in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)]
+            if len(same) > 1:
+                raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
+        joints = [find_frame(model, name).parentJoint for name in closure.frames]
         if joints[0] == joints[1]:
             body = model.names[joints[0]]
             raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")

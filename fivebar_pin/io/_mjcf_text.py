@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.chain import ClosedChain, Visual
+from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
@@ -169,7 +169,7 @@ class _Writer:
 
     def pose(self, frame: str) -> tuple[str, Array]:
         """Return the link of the body that carries a frame, and the frame's pose there."""
-        f = self.model.frames[self.model.getFrameId(frame)]
+        f = find_frame(self.model, frame)
         if f.parentJoint == 0:
             return self.tree.root, np.array(f.placement.homogeneous)
         name = self.model.names[f.parentJoint]

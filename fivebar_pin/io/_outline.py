@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.chain import ClosedChain, Visual
+from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._build import joint_model, set_default_limits
 from fivebar_pin.io._sidecar import DATA_FIELDS
@@ -166,7 +166,7 @@ class _Outline:
             if visual.frame in links:
                 self.visuals.setdefault(visual.frame, []).append(visual)
                 continue
-            f = self.frames[self.model.getFrameId(visual.frame)]
+            f = find_frame(self.model, visual.frame)
             link = self.link_of_joint[f.parentJoint]
             pose = np.array(f.placement.homogeneous) @ visual.placement
             moved = Visual(link, visual.shape, visual.size, pose, visual.rgba, visual.mesh)
