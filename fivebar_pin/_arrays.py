@@ -46,6 +46,24 @@ def checked(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> 
     return array
 
 
+def number(name: str, value: object, *, positive: bool = False, unit: str = "") -> float:
+    """Return one finite number.
+
+    Raises:
+        InvalidInputError: not a number, not finite, or not positive where it must be.
+    """
+    try:
+        x = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInputError(name, value, f"must be one number ({error})") from error
+    tail = f" [{unit}]" if unit else ""
+    if positive and not (np.isfinite(x) and x > 0.0):
+        raise InvalidInputError(name, x, f"must be positive and finite{tail}")
+    if not np.isfinite(x):
+        raise InvalidInputError(name, x, f"must be finite{tail}")
+    return x
+
+
 def skew(x: Array) -> Array:
     """Return [x]× with [x]× y = x × y.  x (..., 3) -> (..., 3, 3)."""
     S = np.zeros((*x.shape, 3))

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked
-from fivebar_pin.errors import FileFormatError, InvalidInputError
+from fivebar_pin._arrays import Array, checked, number, numeric
+from fivebar_pin.errors import FileFormatError, InvalidInputError, OutputError
 
 __all__ = [
     "Motion",
@@ -67,9 +67,8 @@ class Motion:
 
     def scaled(self, speed: float) -> Motion:
         """Return the same path run `speed` times as fast."""
-        if not (np.isfinite(speed) and speed > 0.0):
-            raise InvalidInputError("speed", speed, "must be positive and finite")
-        return Motion(self.t / speed, self.q, self.v * speed, self.a * speed**2)
+        k = number("speed", speed, positive=True)
+        return Motion(self.t / k, self.q, self.v * k, self.a * k**2)
 
 
 def combine(*motions: Motion) -> Motion:
@@ -87,7 +86,7 @@ def constant(t: npt.ArrayLike, value: float) -> Motion:
     """Hold one coordinate still."""
     time = checked("t", t, (None,))
     zero = np.zeros_like(time)
-    return _column(time, zero + value, zero, zero)
+    return _column(time, zero + number("value", value), zero, zero)
 
 
 def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | None = None) -> Motion:
@@ -101,10 +100,11 @@ def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | 
         duration: length of the move [s]; the whole of t unless given.
     """
     time, T, s, moving = _phase(t, duration)
-    h, w = stop - start, 2.0 * np.pi
+    low, h = _ends(start, stop)
+    w = 2.0 * np.pi
     return _column(
         time,
-        start + h * (s - np.sin(w * s) / w),
+        low + h * (s - np.sin(w * s) / w),
         moving * h / T * (1.0 - np.cos(w * s)),
         moving * h * w / T**2 * np.sin(w * s),
     )
@@ -113,24 +113,32 @@ def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | 
 def harmonic(t: npt.ArrayLike, mean: float, amplitude: float, *, period: float, phase: float = 0.0) -> Motion:
     """Swing about a mean: q = mean + amplitude cos(2 pi t / period + phase)."""
     time = checked("t", t, (None,))
-    _positive("period", period)
-    w = 2.0 * np.pi / period
-    x = w * time + phase
-    return _column(time, mean + amplitude * np.cos(x), -amplitude * w * np.sin(x), -amplitude * w**2 * np.cos(x))
+    w = 2.0 * np.pi / number("period", period, positive=True, unit="s")
+    centre, h, x = number("mean", mean), number("amplitude", amplitude), w * time + number("phase", phase)
+    return _column(time, centre + h * np.cos(x), -h * w * np.sin(x), -h * w**2 * np.cos(x))
 
 
 def polynomial(
     t: npt.ArrayLike, start: float, stop: float, *, degree: int = 5, duration: float | None = None
 ) -> Motion:
-    """Move from rest to rest along the 3-4-5 (degree 5) or 4-5-6-7 (degree 7) polynomial."""
+    """Move from rest to rest along a polynomial: degree 3, 5 (3-4-5) or 7 (4-5-6-7).
+
+    Velocity vanishes at both ends; acceleration does too for degrees 5 and 7, jerk for degree 7.
+
+    Args:
+        t: times (n,) [s].
+        start, stop: values at the ends [rad or m].
+        degree: 3, 5 or 7.
+        duration: length of the move [s]; the whole of t unless given.
+    """
     known = {3: [3, -2], 5: [10, -15, 6], 7: [35, -84, 70, -20]}
-    if degree not in known:
+    if not isinstance(degree, (int, np.integer)) or degree not in known:
         raise InvalidInputError("degree", degree, f"must be one of {sorted(known)}")
     time, T, s, moving = _phase(t, duration)
     first = (degree + 1) // 2
     p = np.polynomial.Polynomial([0.0] * first + [float(c) for c in known[degree]])
-    h = stop - start
-    return _column(time, start + h * p(s), moving * h / T * p.deriv()(s), moving * h / T**2 * p.deriv(2)(s))
+    low, h = _ends(start, stop)
+    return _column(time, low + h * p(s), moving * h / T * p.deriv()(s), moving * h / T**2 * p.deriv(2)(s))
 
 
 def spline(t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, periodic: bool = False) -> Motion:
@@ -145,7 +153,7 @@ def spline(t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, per
     from scipy.interpolate import make_interp_spline
 
     time, x = checked("t", t, (None,)), checked("knots", knots, (None,))
-    y = np.array(values, dtype=np.float64)
+    y = numeric("values", values)
     y = checked("values", y[:, None] if y.ndim == 1 else y, (x.size, None))
     if x.size < 6 or np.any(np.diff(x) <= 0.0):
         raise InvalidInputError("knots", x.tolist(), "must be at least six, strictly increasing")
@@ -185,13 +193,31 @@ def from_file(path: str | Path) -> Motion:
     return Motion(column["t"], *(np.stack([column[f"{x}_{c}"] for c in columns], axis=1) for x in "qva"))
 
 
-def to_file(motion: Motion, path: str | Path, names: tuple[str, ...]) -> None:
-    """Write the csv that `from_file` reads; `names` are the actuated joints."""
-    if len(names) != motion.na:
-        raise InvalidInputError("names", names, f"must be {motion.na} names")
+def to_file(motion: Motion, path: str | Path, names: tuple[str, ...], *, overwrite: bool = False) -> None:
+    """Write the csv that `from_file` reads.
+
+    Args:
+        motion: the motion.
+        path: the file to write.
+        names: names of the actuated joints, one per column, all different.
+        overwrite: whether an existing file may be replaced.
+
+    Raises:
+        InvalidInputError: names that are not one per column, repeat, or hold a comma, quote or line break.
+        OutputError: the file exists, or cannot be written.
+    """
+    if len(names) != motion.na or len(set(names)) < len(names):
+        raise InvalidInputError("names", names, f"must be {motion.na} different names")
+    if any(mark in name for name in names for mark in ',"\r\n'):
+        raise InvalidInputError("names", names, "must hold no comma, quote or line break")
+    if Path(path).exists() and not overwrite:
+        raise OutputError(path, "exists already; choose another name or allow overwriting")
     header = ",".join(["t", *(f"{x}_{n}" for x in "qva" for n in names)])
     body = np.column_stack([motion.t, motion.q, motion.v, motion.a])
-    np.savetxt(path, body, delimiter=",", header=header, comments="", fmt="%.17g")
+    try:
+        np.savetxt(path, body, delimiter=",", header=header, comments="", fmt="%.17g", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
 
 
 def _numbers(file: Path, line: int, cells: list[str], width: int) -> list[float]:
@@ -208,8 +234,7 @@ def _phase(t: npt.ArrayLike, duration: float | None) -> tuple[Array, float, Arra
     time = checked("t", t, (None,))
     if time.size == 0:
         raise InvalidInputError("t", [], "must hold at least one sample")
-    T = float(time[-1] - time[0]) if duration is None else float(duration)
-    _positive("duration", T)
+    T = number("duration", time[-1] - time[0] if duration is None else duration, positive=True, unit="s")
     s = np.clip((time - time[0]) / T, 0.0, 1.0)
     return time, T, s, ((time - time[0]) <= T).astype(np.float64)
 
@@ -218,6 +243,7 @@ def _column(t: Array, q: Array, v: Array, a: Array) -> Motion:
     return Motion(t, q[:, None], v[:, None], a[:, None])
 
 
-def _positive(name: str, value: float) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise InvalidInputError(name, value, "must be positive and finite")
+def _ends(start: float, stop: float) -> tuple[float, float]:
+    """Return the start and the way from there to the end."""
+    low = number("start", start)
+    return low, number("stop", stop) - low

@@ -7,7 +7,7 @@ import pytest
 
 from fivebar_pin import Motion
 from fivebar_pin import motion as laws
-from fivebar_pin.errors import FileFormatError, InvalidInputError
+from fivebar_pin.errors import FileFormatError, InvalidInputError, OutputError
 
 KNOTS = np.linspace(0.0, 2.0, 9)
 T = np.linspace(0.3, 1.7, 57)
@@ -104,8 +104,24 @@ def test_a_table_written_is_read_back_to_the_last_bit(tmp_path):
     back = laws.from_file(tmp_path / "m.csv")
     for name in ("t", "q", "v", "a"):
         np.testing.assert_array_equal(getattr(back, name), getattr(m, name))
-    with pytest.raises(InvalidInputError, match="must be 2 names"):
-        laws.to_file(m, tmp_path / "m.csv", ("left",))
+    for names in (("left",), ("left", "left")):
+        with pytest.raises(InvalidInputError, match="must be 2 different names"):
+            laws.to_file(m, tmp_path / "n.csv", names)
+    with pytest.raises(InvalidInputError, match="must hold no comma"):
+        laws.to_file(m, tmp_path / "n.csv", ("left,right", "up"))
+
+
+def test_a_table_is_not_replaced_unless_told_to_and_an_unwritable_one_is_named(tmp_path):
+    """Nothing is lost by writing, and no raw OSError comes out."""
+    first, second = (laws.constant(T, x) for x in (1.0, 2.0))
+    laws.to_file(first, tmp_path / "m.csv", ("x",))
+    with pytest.raises(OutputError, match="exists already"):
+        laws.to_file(second, tmp_path / "m.csv", ("x",))
+    assert laws.from_file(tmp_path / "m.csv").q[0, 0] == 1.0
+    laws.to_file(second, tmp_path / "m.csv", ("x",), overwrite=True)
+    assert laws.from_file(tmp_path / "m.csv").q[0, 0] == 2.0
+    with pytest.raises(OutputError, match="cannot be written"):
+        laws.to_file(first, tmp_path / "none" / "m.csv", ("x",))
 
 
 def test_columns_are_found_by_name_whatever_their_order(tmp_path):
@@ -168,7 +184,15 @@ Z = np.zeros((3, 1))
         (lambda: laws.spline(T + 1.0, KNOTS, VALUES), r"t = .* must lie within \[0.0, 2.0\]"),
         (lambda: laws.spline(T, KNOTS, VALUES, periodic=True), r"values\[-1\] .* must equal values\[0\]"),
         (lambda: laws.spline(T, KNOTS, VALUES[:4]), r"shape of values"),
-        (lambda: laws.constant(T, np.nan), r"motion.q\[0, 0\] = nan"),
+        (lambda: laws.constant(T, np.nan), "value = nan but must be finite"),
+        (lambda: laws.constant(T, "high"), "value = 'high' but must be one number"),
+        (lambda: laws.cycloidal(T, [0.0, 1.0], 2.0), r"start = \[0.0, 1.0\] but must be one number"),
+        (lambda: laws.cycloidal(T, 0.0, 1.0, duration="long"), "duration = 'long' but must be one number"),
+        (lambda: laws.harmonic(T, 0.0, 1.0, period="a"), "period = 'a' but must be one number"),
+        (lambda: laws.harmonic(T, 0.0, None, period=1.0), "amplitude = None but must be one number"),
+        (lambda: laws.polynomial(T, 0.0, 1.0, degree=[5]), r"degree = \[5\] but must be one of \[3, 5, 7\]"),
+        (lambda: laws.spline(T, KNOTS, "abc"), "values = 'abc' but must be an array of numbers"),
+        (lambda: laws.constant(T, 1.0).scaled("fast"), "speed = 'fast' but must be one number"),
     ],
 )
 def test_bad_motions_are_refused(make, message):

@@ -208,6 +208,10 @@ def test_unknown_assembly_mode_lists_the_known_ones():
 
 
 def test_configuration_refuses_angles_that_do_not_pair_up():
-    """psi and gamma have the same length."""
+    """psi and gamma have the same length; a scalar goes with every value; words are no angles."""
+    linkage = paper.FiveBar(**GOOD)
     with pytest.raises(InvalidInputError, match="shape of gamma"):
-        paper.FiveBar(**GOOD).configuration([0.1, 0.2], [1.0, 1.1, 1.2])
+        linkage.configuration([0.1, 0.2], [1.0, 1.1, 1.2])
+    np.testing.assert_array_equal(linkage.configuration([0.1, 0.2], 1.0), linkage.configuration([0.1, 0.2], [1.0, 1.0]))
+    with pytest.raises(InvalidInputError, match="psi = 'a' but must be an array of numbers"):
+        linkage.configuration("a", 1.0)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, checked, frozen, numeric
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
@@ -151,7 +151,7 @@ class FiveBar:
         """Return the configuration of `chain` in which the loop is closed.
 
         Args:
-            psi, gamma: input angles, scalars or (n,) [rad].
+            psi, gamma: input angles, scalars or (n,) [rad]; a scalar goes with every value of the other.
             mode: which of the two closures.
 
         Returns:
@@ -163,9 +163,12 @@ class FiveBar:
         """
         from fivebar_pin.paper.kinematics import position
 
-        single = np.ndim(psi) == 0 and np.ndim(gamma) == 0
-        x = checked("psi", np.atleast_1d(np.asarray(psi, dtype=np.float64)), (None,))
-        y = checked("gamma", np.atleast_1d(np.asarray(gamma, dtype=np.float64)), x.shape)
+        given = numeric("psi", psi), numeric("gamma", gamma)
+        single = all(x.ndim == 0 for x in given)
+        count = max((x.size for x in given if x.ndim), default=1)
+        first, second = (np.full(count, x) if x.ndim == 0 else x for x in given)
+        x = checked("psi", first, (None,))
+        y = checked("gamma", second, x.shape)
         pose = position(self, x, y, mode=mode)
         q = np.stack([y, pose.phi - y, x, pose.theta - x], axis=-1)
         return np.asarray(q[0] if single else q)

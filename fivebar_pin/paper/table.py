@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_pin import motion as laws
+from fivebar_pin._arrays import number
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper.linkage import FiveBar
@@ -89,8 +90,7 @@ def default_motion(*, samples: int = 201, period: float = 1.0) -> Motion:
     """
     if not isinstance(samples, (int, np.integer)) or samples < 2:
         raise InvalidInputError("samples", samples, "must be an integer of at least 2")
-    if not (np.isfinite(period) and period > 0.0):
-        raise InvalidInputError("period", period, "must be positive and finite [s]")
+    number("period", period, positive=True, unit="s")
     t = np.linspace(0.0, period, int(samples))
     psi = laws.cycloidal(t, 0.0, 2.0 * np.pi, duration=period)
     return laws.combine(psi, laws.harmonic(t, np.pi / 2.0, -np.pi / 6.0, period=period))
