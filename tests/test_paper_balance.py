@@ -156,6 +156,42 @@ def test_bounds_on_rho_are_kept_and_their_multipliers_told():
     assert positive.objective <= grid + 1e-12
 
 
+def test_a_single_linkage_within_the_bounds_is_the_optimum():
+    """The rings of rho_1 and rho_4 touch in one point: no multipliers exist there, but nothing else is left."""
+    found = paper.balance(CASE_I, rho_bounds=(-1.2, 3.0))
+    np.testing.assert_allclose(found.linkage.rho, [3.0, 1.0 / 7.0, 8.0 / 7.0, 3.0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.linkage.alpha, [np.pi, 0.0, 0.0, 0.0], rtol=0, atol=1e-7)
+    assert found.conditions.hold() and found.kkt_residual <= 1e-12
+    assert np.all(np.isnan(found.multipliers)) and found.curvature == np.inf
+    pinned = paper.balance(CASE_I, rho_bounds=(OPTIMUM.linkage.rho, OPTIMUM.linkage.rho))
+    np.testing.assert_allclose(pinned.linkage.rho, OPTIMUM.linkage.rho, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("room", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_bounds_that_leave_next_to_nothing_have_an_optimum_still(room):
+    """The region is a lens sqrt(room) high; rho_1 and rho_4 stop at their bounds, the multipliers are large."""
+    found = paper.balance(CASE_I, rho_bounds=(-1.2, 3.0 + room))
+    assert found.conditions.hold() and found.kkt_residual <= 1e-12
+    np.testing.assert_allclose(found.linkage.rho[[0, 3]], 3.0 + room, rtol=0, atol=1e-12)
+    assert found.objective < paper.balance(CASE_I, rho_bounds=(-1.2, 3.0)).objective
+
+
+def test_a_bound_may_be_missing_on_one_side():
+    """Infinity means that there is none."""
+    found = paper.balance(CASE_I, rho_bounds=(-np.inf, 3.7))
+    np.testing.assert_allclose(found.linkage.rho, paper.balance(CASE_I, rho_bounds=(-9.0, 3.7)).linkage.rho, atol=1e-12)
+    free = paper.balance(CASE_I, rho_bounds=(-np.inf, np.inf))
+    np.testing.assert_allclose(free.linkage.rho, OPTIMUM.linkage.rho, rtol=0, atol=1e-12)
+
+
+def test_masses_held_by_their_bounds_give_the_optimum_of_eight_variables():
+    """Bounds that leave no freedom, up to round-off in their sum, are those of `balance`."""
+    held = paper.balance_masses(CASE_I, mass_bounds=(CASE_I.masses, CASE_I.masses))
+    np.testing.assert_allclose(held.linkage.rho, OPTIMUM.linkage.rho, rtol=0, atol=1e-12)
+    again = paper.balance_masses(CASE_I, mass_bounds=(CASE_I.masses, CASE_I.masses), total_mass=0.4 * (1.0 - 1e-15))
+    np.testing.assert_allclose(again.linkage.masses, CASE_I.masses, rtol=1e-12)
+
+
 def test_bounds_that_forbid_balance_are_called_infeasible():
     """No linkage with every mass centre within its link is balanced with these masses."""
     with pytest.raises(InfeasibleError, match=r"No balanced linkage has rho between .* Widen rho_bounds or change"):
@@ -194,6 +230,15 @@ def test_bad_bounds_and_totals_are_refused():
     """Crossed, not positive, or impossible together."""
     with pytest.raises(InvalidInputError, match="the lowest must not exceed the highest"):
         paper.balance(CASE_I, rho_bounds=(1.0, 0.0))
+    for bounds in (3.0, (1.0, 2.0, 3.0), None, "ab"):
+        with pytest.raises(InvalidInputError, match="mass_bounds"):
+            paper.balance_masses(CASE_I, mass_bounds=bounds)
+    for low, high in ((np.inf, np.inf), (-np.inf, -np.inf), (np.nan, 1.0), ("a", 1.0)):
+        with pytest.raises(InvalidInputError, match="rho_bounds"):
+            paper.balance(CASE_I, rho_bounds=(low, high))
+    for tolerance in (-1.0, 0.0, np.nan, "tight"):
+        with pytest.raises(InvalidInputError, match="tolerance"):
+            paper.balance(CASE_I, tolerance=tolerance)
     with pytest.raises(InvalidInputError, match=r"shape of rho_bounds\[0\]"):
         paper.balance(CASE_I, rho_bounds=([0.0, 1.0], 2.0))
     with pytest.raises(InvalidInputError, match=r"mass_bounds\[0\] = .* must be positive, \(71\)"):

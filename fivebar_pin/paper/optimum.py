@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, checked, frozen, number, numeric
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, SolverError
 from fivebar_pin.paper.equations import Conditions, conditions
 from fivebar_pin.paper.linkage import FiveBar
-from fivebar_pin.paper.polar import Problem, Stationary, climb
-from fivebar_pin.paper.starts import balanced_points, mixtures
+from fivebar_pin.paper.polar import Problem, Stationary, alone, climb
+from fivebar_pin.paper.starts import balanced_points, mixtures, only_point
 
 __all__ = ["Optimum", "balance", "balance_masses"]
 
@@ -30,7 +31,9 @@ class Optimum:
         conditions: residuals of (60)-(63), (68)-(71).
         multipliers: of the conditions: (6,), or (7,) when the masses are free.
         bound_multipliers: of active bounds on alpha (none), rho and mu (12,); zero elsewhere.
-        kkt_residual: largest violation of the optimality conditions [-].
+        kkt_residual: largest violation of the optimality conditions [-]; slopes relative to the largest multiplier
+            where that exceeds one. Where the bounds leave a single linkage it is the optimum without multipliers
+            (nan), and this is its largest residual of the conditions and bounds.
         curvature: least eigenvalue of the Lagrangian's Hessian along the conditions; positive: a strict minimum.
         starts: how many starting points were tried.
         reached: how many of them led to a minimum.
@@ -78,18 +81,22 @@ def balance(
     Args:
         linkage: gives lengths, masses and inertias; its rho and alpha do not matter.
         weights: w_alpha and w_rho, positive, with sum 1, (78).
-        rho_bounds: lowest and highest rho, scalars or (4,) each [-]; rho may be negative unless they say otherwise.
+        rho_bounds: lowest and highest rho, scalars or (4,) each [-], infinite where there is none; rho may be
+            negative unless they say otherwise.
         tolerance: bound on the KKT residual [-].
 
     Raises:
-        InvalidInputError: weights outside (78), bounds in the wrong order.
+        InvalidInputError: weights outside (78), bounds in the wrong order, a tolerance that is not positive.
         InfeasibleError: no linkage within the bounds is balanced.
         SolverError: no start reached a minimum.
     """
     mu = linkage.mass_ratios
     problem = _problem(weights, rho_bounds, (mu, mu))
+    number("tolerance", tolerance, positive=True)
     starts = balanced_points(problem, mu, each=1 if rho_bounds is None else 3)  # bounds may cut the plane apart
-    return _best(linkage, problem, starts, tolerance, float(linkage.masses.sum()))
+    only = only_point(problem, mu) if rho_bounds is not None else []
+    points = [alone(problem, x) for x in only] or [climb(problem, x) for x in starts]
+    return _best(linkage, problem, only or starts, points, tolerance)
 
 
 def balance_masses(
@@ -107,7 +114,8 @@ def balance_masses(
 
     Args:
         linkage: gives lengths, inertias, and the total mass unless given.
-        mass_bounds: lowest and highest mass of each link, scalars or (4,) each [kg]; the lowest must be positive.
+        mass_bounds: lowest and highest mass of each link, scalars or (4,) each [kg]; the lowest must be positive, the
+            highest may be infinite.
         total_mass: sum of the four masses [kg].
         weights, rho_bounds, tolerance: as for `balance`.
 
@@ -116,17 +124,16 @@ def balance_masses(
         InfeasibleError: the mass bounds do not allow the total mass, or no mass distribution tried can be balanced.
         SolverError: no start reached a minimum.
     """
-    total = float(linkage.masses.sum()) if total_mass is None else float(total_mass)
-    if not (np.isfinite(total) and total > 0.0):
-        raise InvalidInputError("total_mass", total, "must be positive and finite [kg]")
+    total = number("total_mass", linkage.masses.sum() if total_mass is None else total_mass, positive=True, unit="kg")
     low, high = _bounds("mass_bounds", mass_bounds)
     if np.any(low <= 0.0):
         raise InvalidInputError("mass_bounds[0]", low.tolist(), "must be positive, (71) [kg]")
-    if low.sum() > total or high.sum() < total:
+    if low.sum() > total * (1.0 + 1e-12) or high.sum() < total * (1.0 - 1e-12):
         raise InfeasibleError(
             f"Masses between {low.tolist()} and {high.tolist()} kg add up to between {low.sum():g} and {high.sum():g} "
             f"kg, never to the total mass of {total:g} kg. Change mass_bounds or total_mass."
         )
+    number("tolerance", tolerance, positive=True)
     problem = _problem(weights, rho_bounds, (low / total, np.minimum(high / total, 1.0)))
     starts: list[Array] = []
     reasons: list[InfeasibleError] = []
@@ -137,7 +144,8 @@ def balance_masses(
             reasons.append(error)
     if not starts:
         raise InfeasibleError(f"No mass distribution tried can be balanced within rho_bounds. {reasons[0]}")
-    return _best(linkage, problem, starts, tolerance, total)
+    points = [climb(problem, x) for x in starts]
+    return _best(linkage, problem, starts, points, tolerance, total=total)
 
 
 def _problem(weights: tuple[float, float], rho_bounds: Bounds | None, mu: tuple[Array, Array]) -> Problem:
@@ -152,18 +160,30 @@ def _problem(weights: tuple[float, float], rho_bounds: Bounds | None, mu: tuple[
 
 
 def _bounds(name: str, bounds: Bounds) -> tuple[Array, Array]:
+    if not isinstance(bounds, Sequence | np.ndarray) or len(bounds) != 2:
+        raise InvalidInputError(name, bounds, "must be a pair: the lowest and the highest, scalars or (4,) each")
     pair = []
     for side, values in zip(("[0]", "[1]"), bounds, strict=True):
-        array = np.broadcast_to(np.asarray(values, dtype=np.float64), (4,)) if np.ndim(values) == 0 else values
-        pair.append(checked(name + side, array, (4,)))
+        array = numeric(name + side, values)
+        array = np.full(4, array) if array.ndim == 0 else array
+        checked(name + side, np.where(np.isinf(array), 0.0, array), (4,))  # infinite: no bound on this side
+        pair.append(array)
     low, high = pair
-    if np.any(low > high):
+    if np.any(low > high) or np.any(low == np.inf) or np.any(high == -np.inf):
         raise InvalidInputError(name, [low.tolist(), high.tolist()], "the lowest must not exceed the highest")
     return low, high
 
 
-def _best(linkage: FiveBar, problem: Problem, starts: list[Array], tolerance: float, total: float) -> Optimum:
-    points = [climb(problem, start) for start in starts]
+def _best(
+    linkage: FiveBar,
+    problem: Problem,
+    starts: list[Array],
+    points: list[Stationary],
+    tolerance: float,
+    *,
+    total: float | None = None,
+) -> Optimum:
+    """Return the best of the points that are minima; `total` mass where the masses were free [kg]."""
     minima = [p for p in points if p.residual <= tolerance and p.curvature >= -1e-9]
     if not minima:
         nearest: Stationary = min(points, key=lambda p: p.residual)
@@ -186,7 +206,7 @@ def _best(linkage: FiveBar, problem: Problem, starts: list[Array], tolerance: fl
         )
     distinct = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > 1e-9 * (1.0 + v)]
     alpha, rho, mu = best.x[:4], best.x[4:8], best.x[8:]
-    masses = total * mu if problem.free[8:].any() else linkage.masses
+    masses = linkage.masses if total is None else total * mu
     balanced = replace(linkage, masses=masses, rho=rho, alpha=alpha)
     return Optimum(
         linkage=balanced,

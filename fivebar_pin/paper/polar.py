@@ -15,7 +15,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array
 from fivebar_pin.paper.equations import RIGHT, ROWS
 
-__all__ = ["Problem", "Stationary", "climb"]
+__all__ = ["Problem", "Stationary", "alone", "climb"]
 
 _NEAR = 1e-7  # a variable this close to its bound after the first solver is tried as active
 
@@ -95,7 +95,8 @@ class Stationary:
         x: (12,).
         multipliers: of the conditions, (6,) or (7,).
         bound_multipliers: gradient of the Lagrangian (12,), zero but at active bounds.
-        residual: largest of stationarity, conditions, bounds crossed and multipliers of the wrong sign [-].
+        residual: largest of stationarity, conditions, bounds crossed and multipliers of the wrong sign [-];
+            stationarity and signs relative to the largest multiplier where that exceeds one.
         curvature: least eigenvalue of the Lagrangian's Hessian along the conditions and active bounds; inf at a corner.
     """
 
@@ -104,6 +105,13 @@ class Stationary:
     bound_multipliers: Array
     residual: float
     curvature: float
+
+
+def alone(problem: Problem, x: Array) -> Stationary:
+    """Return the judgement of a point that is the only feasible one: optimal, though no multipliers need exist."""
+    outside = np.maximum(np.maximum(problem.low - x, x - problem.high), 0.0)
+    residual = float(max(np.abs(problem.residual(x)).max(), outside.max()))
+    return Stationary(x, np.full(len(problem.rows), np.nan), np.full(12, np.nan), residual, float("inf"))
 
 
 def climb(problem: Problem, start: Array) -> Stationary:
@@ -184,9 +192,10 @@ def _judge(problem: Problem, x: Array, active: npt.NDArray[np.bool_]) -> Station
     slope = g + J.T @ multipliers
     outside = np.maximum(np.maximum(problem.low - x, x - problem.high), 0.0)
     held = np.where(active & problem.free, slope, 0.0)
-    parts = [np.abs(slope[~active]), np.abs(problem.residual(x)), outside]
+    scale = max(1.0, float(np.abs(multipliers).max(initial=0.0)))
+    parts = [np.abs(slope[~active]) / scale, np.abs(problem.residual(x)), outside]
     point = Stationary(x, multipliers, held, 0.0, 0.0)
-    parts.append(np.where(active & problem.free, _wrong_sign(problem, point), 0.0))
+    parts.append(np.where(active & problem.free, _wrong_sign(problem, point), 0.0) / scale)
     residual = max(float(p.max(initial=0.0)) for p in parts)
     return Stationary(x, multipliers, held, residual, _curvature(problem, x, multipliers, active))
 

@@ -15,7 +15,8 @@ def common_points(centres: npt.ArrayLike, inner: npt.ArrayLike, outer: npt.Array
     """Return points common to the rings inner_i <= |s - centre_i| <= outer_i, and the least violation otherwise.
 
     If rings have a common part, its border holds a point where two of their circles meet, or a whole circle, or there
-    is no border; so it is enough to look at the meeting points, at one point of each circle and at one centre.
+    is no border; so it is enough to look at the meeting points, at some points of each circle and at one centre. Where
+    all that is found is one point, the common part is that point alone.
 
     Args:
         centres: real or complex (k,).
@@ -30,7 +31,7 @@ def common_points(centres: npt.ArrayLike, inner: npt.ArrayLike, outer: npt.Array
     circles = [(z, r) for z, pair in zip(c, zip(low, high, strict=True), strict=True) for r in pair if np.isfinite(r)]
     points = [c[0]]
     for k, (z, r) in enumerate(circles):
-        points.append(z + r)
+        points += [z + r * turn for turn in (1.0, 1j, -1.0, -1j)]
         for w, t in circles[:k]:
             points += _meet(z, float(r), w, float(t))
     s = np.array(points)

@@ -12,26 +12,51 @@ from fivebar_pin.paper.linkage import CArray
 from fivebar_pin.paper.polar import Problem
 from fivebar_pin.paper.rings import common_points
 
-__all__ = ["balanced_points", "mixtures"]
+__all__ = ["balanced_points", "mixtures", "only_point"]
+
+_ALONE = 3e-8  # common points this close together [spread of the centres] are one: a touching point is a double root
+
+
+def only_point(problem: Problem, mu: Array) -> list[Array]:
+    """Return the one balanced linkage that the bounds leave, in all its spellings, best first; else nothing.
+
+    (rho, alpha) and (-rho, alpha + pi) are the same link.
+    """
+    corners, _ = common_points(*_rings(problem, mu))
+    if not len(corners) or np.abs(corners - corners[0]).max() > _ALONE * float(np.ptp(_shift(mu))):
+        return []
+    return _spelled(problem, mu, corners, each=1)
 
 
 def balanced_points(problem: Problem, mu: Array, *, each: int) -> list[Array]:
-    """Return good balanced points for each choice of the side of every joint, best first.
-
-    mu2 l2 = s is the free complex number; |l_i| within its bounds makes a ring about -shift_i for s.
-    """
-    shift = np.array([-mu[1], 0.0, mu[2], mu[2] + mu[3]])  # mu_i l_i = s + shift_i
+    """Return good balanced points for each choice of the side of every joint, best first."""
     low, high = problem.low[4:8], problem.high[4:8]
-    inner = np.where((low <= 0.0) & (high >= 0.0), 0.0, np.minimum(np.abs(low), np.abs(high)))
-    outer = np.maximum(np.abs(low), np.abs(high))
-    corners, violation = common_points(-shift, mu * inner, mu * outer)
+    rings = _rings(problem, mu)
+    corners, violation = common_points(*rings)
     if violation > 1e-12:
         raise InfeasibleError(
             f"No balanced linkage has rho between {low.tolist()} and {high.tolist()} with the mass ratios "
             f"{np.round(mu, 6).tolist()}: the bounds would have to give way by {violation:.3g} in mu rho. "
             "Widen rho_bounds or change the masses."
         )
-    s = np.concatenate([corners, _grid(shift), _ring_grid(-shift, mu * inner, mu * outer)])
+    return _spelled(problem, mu, np.concatenate([corners, _grid(_shift(mu)), _ring_grid(*rings)]), each=each)
+
+
+def _shift(mu: Array) -> Array:
+    """Return the shifts of mu_i l_i = s + shift_i (4,), where s = mu2 l2 is the free complex number."""
+    return np.array([-mu[1], 0.0, mu[2], mu[2] + mu[3]])
+
+
+def _rings(problem: Problem, mu: Array) -> tuple[Array, Array, Array]:
+    """Return centres, inner and outer radii of the rings for s that the bounds on rho_i = |l_i| make."""
+    low, high = problem.low[4:8], problem.high[4:8]
+    inner = np.where((low <= 0.0) & (high >= 0.0), 0.0, np.minimum(np.abs(low), np.abs(high)))
+    return -_shift(mu), mu * inner, mu * np.maximum(np.abs(low), np.abs(high))
+
+
+def _spelled(problem: Problem, mu: Array, s: CArray, *, each: int) -> list[Array]:
+    """Return the best of the points s, up to `each` for every choice of the sides, as (alpha, rho, mu), best first."""
+    shift, low, high = _shift(mu), problem.low[4:8], problem.high[4:8]
     l = (s[:, None] + shift) / mu
     starts: list[tuple[float, Array]] = []
     for sides in product((0.0, np.pi), repeat=4):
@@ -78,7 +103,9 @@ def mixtures(low: Array, high: Array) -> list[Array]:
         wish = low + np.array(lean) * (high - low)
         short = 1.0 - wish.sum()
         room = (high - wish) if short > 0.0 else (wish - low)
-        if room.sum() >= abs(short) > 0.0 or short == 0.0:
-            found.append(wish + (short * room / room.sum() if short else 0.0))
+        if abs(short) <= 1e-12:  # round-off
+            found.append(wish)
+        elif room.sum() >= abs(short) - 1e-12:
+            found.append(wish + short * room / room.sum())
     rows = {tuple(np.round(mu, 9)): mu for mu in found}
     return list(rows.values())[:: max(1, len(rows) // 12)]
