@@ -217,6 +217,18 @@ def test_a_folded_dyad_whose_ends_meet_between_samples_is_found():
         paper.solve(linkage, swing(linkage, np.pi - 0.5, np.pi + 0.5))
 
 
+@pytest.mark.parametrize("a2", [0.1, 0.11])
+def test_a_jump_from_rest_to_rest_through_a_singularity_is_found(a2):
+    """Rates of zero at both samples do not hide that the straight way between them passes O2 over O4."""
+    linkage = paper.FiveBar([0.1, a2, 0.1, 0.1, 0.1], [0.1] * 4, [1e-4] * 4, [0.5] * 4, [0.0] * 4)
+    meet = np.array([np.pi / 3.0, 2.0 * np.pi / 3.0])
+    motion = Motion(np.arange(2.0), [meet - 0.4, meet + 0.4], np.zeros((2, 2)), np.zeros((2, 2)))
+    with pytest.raises(SingularityError, match="between sample 0, t = 0 s, and sample 1"):
+        paper.solve(linkage, motion)
+    beside = Motion(motion.t, [meet - 0.4, meet - 0.3], motion.v, motion.a)
+    assert len(paper.solve(linkage, beside)) == 2
+
+
 def test_input_of_the_wrong_form_is_refused():
     """Three motors, wrong shapes, unknown modes."""
     linkage, motion = paper.table_1("I", "unbalanced"), paper.default_motion(samples=5)

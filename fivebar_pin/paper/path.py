@@ -29,7 +29,8 @@ def check_path(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], r
     """Raise when the motion passes a singularity between two samples.
 
     O2, O3, O4 lie on a line where the distance |O2 O4| reaches a2 + a3 or |a2 - a3|. Intervals that could get there at
-    twice the speed of their ends are followed in small steps along the quintic that fits q, v, a at both ends.
+    twice the speed of their ends, or over twice the way between them, are followed in small steps along the quintic
+    that fits q, v, a at both ends.
 
     Args:
         linkage: the linkage.
@@ -47,10 +48,12 @@ def check_path(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], r
     speed = np.abs(driven[1]) * np.array([[a1], [a4]])
     speed = speed[0] + speed[1]
     spans = np.diff(t)
-    step = 2.0 * float(spans.max()) * float(speed.max())
+    way = np.abs(np.diff(driven[0], axis=1)) * np.array([[a1], [a4]])  # also where the given rates do not tell
+    way = way[0] + way[1]
+    step = 2.0 * max(float(spans.max()) * float(speed.max()), float(way.max()))
     if low + step < reach.min() and reach.max() < high - step:
         return
-    steps = 2.0 * spans * np.maximum(speed[1:], speed[:-1])
+    steps = 2.0 * np.maximum(spans * np.maximum(speed[1:], speed[:-1]), way)
     far = np.maximum(reach[1:], reach[:-1]) + steps >= high
     near = np.minimum(reach[1:], reach[:-1]) - steps <= low
     _follow(linkage, t, driven, np.flatnonzero(far | near))
