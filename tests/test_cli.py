@@ -51,6 +51,24 @@ def test_demo_balanced_file_is_a_balanced_mechanism(results: Path) -> None:
     assert np.abs(loads.torque).max() > 1e-3
 
 
+def test_demo_refuses_a_playing_speed_before_it_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No half of the results is left behind."""
+    for word in ("0", "-1", "nan"):
+        assert main(["demo", "--out", str(tmp_path / "out"), "--speed", word]) == 1
+        assert "speed" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_demo_takes_the_other_reading_of_case_II(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Masses of 0.24 and 0.31 kg, on the other assembly mode and under gravity."""
+    words = ["--case", "II", "--reading", "corrected", "--mode", "right", "--gravity", "0", "-9.81", "0"]
+    assert main(["demo", "--out", str(tmp_path / "out"), "--samples", "11", *words]) == 0
+    said = capsys.readouterr().out
+    assert "0.24" in said and "0.31" in said
+    chain = fb.load(tmp_path / "out" / "five_bar_balanced.urdf")
+    np.testing.assert_allclose(sorted(b.mass for b in chain.model.inertias)[1:], [0.03, 0.075, 0.24, 0.31])
+
+
 def test_demo_does_not_overwrite(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A folder with results is refused in one line that says the way out."""
     before = (results / "results.csv").read_bytes()

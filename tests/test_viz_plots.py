@@ -63,6 +63,21 @@ def test_shaking_leaves_out_components_that_vanish(loads: dict[str, fb.Loads]) -
     assert np.array_equal(figure.axes[2].lines[1].get_ydata(), loads["balanced"].shaking_moment[:, 2])
 
 
+def test_com_legend_tells_the_largest_distance_from_the_start(loads: dict[str, fb.Loads]) -> None:
+    """The travel is that of the tables, not the diagonal of a box."""
+    com = loads["unbalanced"].com
+    travel = 1e3 * max(float(np.linalg.norm(x - com[0])) for x in com)
+    label = str(plots.com(loads).axes[0].lines[0].get_label())
+    assert float(label.split()[-2]) == pytest.approx(travel, rel=6e-3)
+
+
+def test_a_single_sample_is_a_dot(loads: dict[str, fb.Loads]) -> None:
+    """A line through one point would not be seen."""
+    one = plots.forces({"a": np.ones((1, 1, 2))}, ("f01",), t=[0.0])
+    assert one.axes[0].lines[0].get_marker() == "o"
+    assert plots.com(loads).axes[0].lines[0].get_marker() == "None"
+
+
 def test_com_is_drawn_in_its_plane_in_millimetres(loads: dict[str, fb.Loads]) -> None:
     """The path is drawn over the two axes of largest travel, equally scaled."""
     ax = plots.com(loads).axes[0]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fivebar_pin import motion as laws
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, number
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.dynamics import Loads, inverse_dynamics
@@ -51,6 +51,12 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         description="Balance the paper's five-bar; print, plot, animate and write what came out.",
     )
     parser.add_argument("--case", default="I", help="parameter set of Table 1, I or II [I]")
+    parser.add_argument(
+        "--reading",
+        choices=("printed", "corrected"),
+        default="printed",
+        help="balanced masses of case II: as printed, or with m2 = 0.24 and m3 = 0.31 kg for 0.024 and 0.031 [printed]",
+    )
     parser.add_argument("--mode", choices=("left", "right"), default="left", help="assembly mode [left]")
     parser.add_argument("--motion", metavar="CSV", help="motion of psi and gamma (t, q_*, v_*, a_*)")
     parser.add_argument("--samples", type=int, default=201, help="samples of the default motion [201]")
@@ -67,6 +73,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Do the whole job."""
     from fivebar_pin import paper, viz
 
+    number("speed", chosen.speed, positive=True)
     folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite)
     mode = paper.AssemblyMode[chosen.mode.upper()]
     motion = (
@@ -75,7 +82,7 @@ def run(chosen: argparse.Namespace) -> int:
         else paper.default_motion(samples=chosen.samples, period=chosen.period)
     )
     unbalanced = paper.table_1(chosen.case, "unbalanced")
-    optimum = paper.balance(paper.table_1(chosen.case, "balanced"))
+    optimum = paper.balance(paper.table_1(chosen.case, "balanced", reading=chosen.reading))
     runs = [
         _moved(label, linkage, motion, mode, chosen.gravity)
         for label, linkage in (("unbalanced", unbalanced), ("balanced", optimum.linkage))

@@ -129,6 +129,8 @@ def forces(
 def com(loads: Mapping[str, Loads], *, title: str = "Path of the total mass centre") -> Figure:
     """Plot the path of the total mass centre of each mechanism in the plane of its largest travel.
 
+    A dot marks where it starts; the legend tells the largest distance from there.
+
     Args:
         loads: loads of each mechanism, by label.
         title: what the figure is called.
@@ -139,7 +141,7 @@ def com(loads: Mapping[str, Loads], *, title: str = "Path of the total mass cent
     figure, (ax,) = _sheet(1, 1, title, height=5.5)
     for k, (label, path) in enumerate(paths.items()):
         colour, dash, width = _STYLES[k % len(_STYLES)]
-        size = float(np.linalg.norm(np.ptp(path, axis=0)))
+        size = float(np.linalg.norm(path - path[0], axis=1).max())
         words = f"{label}: travel {1e3 * size:.3g} mm"
         ax.plot(1e3 * path[:, i], 1e3 * path[:, j], color=colour, linestyle=dash, linewidth=width, label=words)
         ax.plot(1e3 * path[0, i], 1e3 * path[0, j], marker="o", color=colour, markersize=7, linestyle="none")
@@ -225,7 +227,8 @@ def _sheet(rows: int, columns: int, title: str, *, height: float) -> tuple[Figur
 
 def _draw(ax: Axes, t: Array, values: Array, label: str, number: int) -> None:
     colour, dash, width = _STYLES[number % len(_STYLES)]
-    ax.plot(t, values, color=colour, linestyle=dash, linewidth=width, label=label)
+    marker = "o" if len(t) == 1 else None  # a line of one point cannot be seen
+    ax.plot(t, values, color=colour, linestyle=dash, linewidth=width, marker=marker, label=label)
 
 
 def _series(
