@@ -11,6 +11,7 @@ from fivebar_pin import _bodies
 from fivebar_pin import closures as rows
 from fivebar_pin._arrays import Array, cross, frozen
 from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of
+from fivebar_pin._springs import JointSpring, Spring, body_wrenches
 from fivebar_pin._tree import Poses
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.trajectory import Trajectory
@@ -23,11 +24,12 @@ class Reactions:
     Attributes:
         multipliers: closure forces in the rows of J (n, m); of least norm where the closures are redundant.
         closure: wrench by body 1 on body 2 at the closure point (n, closures, 6) [N, N m].
-        joint: wrench by the parent on the body of every joint, motor included, at the joint origin (n, nb, 6).
+        joint: wrench by the parent on the body of every joint, motor and joint springs included, at the joint origin
+            (n, nb, 6).
         closure_local: `closure` in the axes of frame 1.
         joint_local: `joint` in the axes of the joint, that is of the body it carries.
         bodies: momenta of the bodies and their rates.
-        gravity, external: wrench on every body at the world origin (n, nb, 6).
+        gravity, external, sprung: wrench on every body at the world origin; the last by springs (n, nb, 6).
         mismatch: largest unbalanced joint torque [N m or N]; round-off when the trajectory is consistent.
 
     Components that the closures do not determine (they depend on which of the redundant rows carries the load) are
@@ -42,11 +44,17 @@ class Reactions:
     bodies: _bodies.BodyRates
     gravity: Array
     external: Array
+    sprung: Array
     mismatch: float
 
 
 def reactions(
-    chain: ClosedChain, trajectory: Trajectory, tree_torque: Array, torque: Array, external: Mapping[str, Array]
+    chain: ClosedChain,
+    trajectory: Trajectory,
+    tree_torque: Array,
+    torque: Array,
+    external: Mapping[str, Array],
+    springs: tuple[Spring | JointSpring, ...],
 ) -> Reactions:
     """Compute all reactions; see `Reactions`."""
     loops = loops_of(chain)
@@ -57,16 +65,26 @@ def reactions(
     moving = _bodies.body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = _bodies.gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
     applied = _applied(chain, poses, external, moving.rate.shape)
+    sprung = body_wrenches(chain, loops, springs, trajectory.v, poses)
     unbalanced = np.array(tree_torque)
     unbalanced[:, loops.actuated] -= torque
     forces = _closure_forces(loops, poses, unbalanced)
-    carried = _carried(chain, loops, moving.rate - gravity - applied, forces.wrench)
+    carried = _carried(chain, loops, moving.rate - gravity - applied - sprung, forces.wrench)
     slack = _carried(chain, loops, np.zeros((*forces.free.shape[:2], *carried.shape[1:])), forces.free)
     unit = np.r_[np.ones(3), np.full(3, chain.length)]
     closure = _seen(forces.wrench, forces.free, forces.point, forces.axes, unit)
     joint = _seen(carried, slack, np.stack(poses.p[1:], axis=1), np.stack(poses.R[1:], axis=1), unit)
     return Reactions(
-        forces.multipliers, closure[0], joint[0], closure[1], joint[1], moving, gravity, applied, forces.mismatch
+        forces.multipliers,
+        closure[0],
+        joint[0],
+        closure[1],
+        joint[1],
+        moving,
+        gravity,
+        applied,
+        sprung,
+        forces.mismatch,
     )
 
 

@@ -120,6 +120,26 @@ def spring_forces(
     return total
 
 
+def body_wrenches(
+    chain: ClosedChain, loops: Loops, springs: Iterable[Spring | JointSpring], v: Array, poses: Poses
+) -> Array:
+    """Return the wrench of the springs between frames on every body, at the world origin (n, nb, 6).
+
+    Springs on joints act through the joint and are not among them.
+    """
+    out = np.zeros((v.shape[0], chain.model.njoints - 1, 6))
+    for spring in springs:
+        if isinstance(spring, JointSpring):
+            continue
+        pull = _pull(chain, loops, spring, v, poses)
+        force = pull.size[:, None] * pull.u
+        for frame, point, sign in zip((spring.frame1, spring.frame2), pull.points, (1.0, -1.0), strict=True):
+            j = int(find_frame(chain.model, frame).parentJoint)
+            if j:
+                out[:, j - 1] += sign * np.concatenate([force, cross(point, force)], axis=1)
+    return out
+
+
 def frame_points(chain: ClosedChain, loops: Loops, frame: str, poses: Poses) -> tuple[Array, Array]:
     """Return a frame's world origin (n, 3) and the Jacobian of its twist at the world origin (n, 6, nv)."""
     found = find_frame(chain.model, frame)
@@ -145,7 +165,19 @@ def _on_joint(chain: ClosedChain, loops: Loops, spring: JointSpring, q: Array, v
     return SpringForces(force, 0.5 * spring.stiffness * deflection**2, spring.damping * v[:, k] ** 2)
 
 
-def _between(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Poses) -> SpringForces:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pull:
+    """What a spring between frames does: the forces at its ends are `size` u and -`size` u."""
+
+    points: tuple[Array, Array]  # (n, 3) each
+    u: Array  # unit, from frame 1 to frame 2 (n, 3)
+    row: Array  # rate of the length = row v (n, nv)
+    stretch: Array  # (n,)
+    rate: Array
+    size: Array
+
+
+def _pull(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Poses) -> _Pull:
     (p1, J1), (p2, J2) = (frame_points(chain, loops, f, poses) for f in (spring.frame1, spring.frame2))
     d = p2 - p1
     size = np.linalg.norm(d, axis=1)
@@ -160,8 +192,13 @@ def _between(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: 
     # rate of |d|, as a row over v: u . (v_2 - v_1)
     row = np.einsum("ni,nik->nk", u, _point(p2, J2) - _point(p1, J1))
     rate = np.einsum("nk,nk->n", row, v)
-    pull = spring.stiffness * stretch + spring.damping * rate
-    return SpringForces(-pull[:, None] * row, 0.5 * spring.stiffness * stretch**2, spring.damping * rate**2)
+    return _Pull((p1, p2), u, row, stretch, rate, spring.stiffness * stretch + spring.damping * rate)
+
+
+def _between(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Poses) -> SpringForces:
+    pull = _pull(chain, loops, spring, v, poses)
+    energy, dissipation = 0.5 * spring.stiffness * pull.stretch**2, spring.damping * pull.rate**2
+    return SpringForces(-pull.size[:, None] * pull.row, energy, dissipation)
 
 
 def _point(p: Array, J: Array) -> Array:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,6 +25,7 @@ from fivebar_pin import _bodies
 from fivebar_pin._arrays import Array, checked, cross, frozen, numeric
 from fivebar_pin._loops import loops_of
 from fivebar_pin._reactions import Reactions, reactions
+from fivebar_pin._springs import JointSpring, Spring, SpringForces, checked_springs, spring_forces
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.trajectory import Trajectory
@@ -45,6 +46,7 @@ class Loads:
         about: the point the moment refers to (3,) [m].
         chain, trajectory: what the loads belong to.
         external: wrenches (n, 6) by frame name, as given to `inverse_dynamics`.
+        springs: as given to `inverse_dynamics`.
     """
 
     torque: Array
@@ -55,6 +57,7 @@ class Loads:
     trajectory: Trajectory
     tree_torque: Array = field(repr=False)
     external: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    springs: tuple[Spring | JointSpring, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         peak = {
@@ -73,11 +76,14 @@ class Loads:
     @cached_property
     def reactions(self) -> Reactions:
         """Closure forces and joint reactions; components that the model leaves open are nan."""
-        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external)
+        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external, self.springs)
 
     @property
     def joint_reactions(self) -> Array:
-        """Wrench by the parent on the body of every joint, about the joint origin (n, njoints - 1, 6) [N, N m]."""
+        """Wrench by the parent on the body of every joint, about the joint origin (n, njoints - 1, 6) [N, N m].
+
+        Motors, losses and springs on the joint are part of it; springs between frames are not.
+        """
         return self.reactions.joint
 
     @property
@@ -107,16 +113,26 @@ class Loads:
         gravity = np.array(self.chain.model.gravity.linear)
         return frozen(-self.chain.mass * self.com @ gravity)
 
+    @cached_property
+    def elastic_energy(self) -> Array:
+        """Energy stored in the springs (n,) [J]."""
+        return frozen(self._sprung.energy)
+
+    @cached_property
+    def _sprung(self) -> SpringForces:
+        loops, q = loops_of(self.chain), self.trajectory.q
+        return spring_forces(self.chain, loops, self.springs, q, self.trajectory.v, loops.tree.poses(q))
+
     def power_residual(self) -> float:
         """Return the largest mismatch between the power of the motors and the rate of energy, relative [-].
 
         The rate of energy is summed body by body (Newton and Euler), the torque comes from Pinocchio. Friction,
-        rotors (armature) and external forces are accounted for.
+        rotors (armature), springs and external forces are accounted for.
         """
         r = self.reactions
         va = self.trajectory.v[:, self.chain.actuated_index]
         supplied = self.torque * va
-        lost = friction_torque(self.chain, self.trajectory.v) * self.trajectory.v
+        lost = (friction_torque(self.chain, self.trajectory.v) - self._sprung.force) * self.trajectory.v
         rate = np.sum((r.bodies.rate - r.gravity - r.external) * r.bodies.twist, axis=2)
         lost = lost + np.array(self.chain.model.armature) * self.trajectory.a * self.trajectory.v
         mismatch = np.abs(supplied.sum(axis=1) - lost.sum(axis=1) - rate.sum(axis=1))
@@ -142,10 +158,13 @@ def inverse_dynamics(
     *,
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     external: Mapping[str, npt.ArrayLike] | None = None,
+    springs: Iterable[Spring | JointSpring] = (),
 ) -> Loads:
     """Compute the actuated torques and the force and moment on the frame along a trajectory.
 
-    Gravity, armature, viscous damping and dry friction are taken from the chain's model.
+    Gravity, armature, viscous damping and dry friction are taken from the chain's model. Springs belong to the
+    mechanism: what one that is anchored in the ground pulls there is part of the force on the frame, which is
+    -dp/dt + m g with springs as without; they change the torques and the reactions.
 
     Args:
         chain: the mechanism.
@@ -153,13 +172,15 @@ def inverse_dynamics(
         about: point (3,) the shaking moment refers to [m], world.
         external: forces applied from outside: frame name -> wrench (n, 6) or (6,), force [N] and moment [N m] in
             world axes at the frame's origin.
+        springs: springs and dampers, as `simulate` takes them.
 
     Returns:
         The loads; reactions, energies and centre of mass are computed when asked for.
 
     Raises:
         InvalidInputError: a trajectory of another mechanism, wrong shapes.
-        UnknownNameError: an external force on a frame that does not exist.
+        UnknownNameError: an external force or a spring on a frame or joint that does not exist.
+        SolverError: a spring whose ends meet has a force of no direction.
     """
     n = len(trajectory)
     if trajectory.q.shape != (n, chain.nq) or trajectory.N.shape != (n, chain.nv, chain.na):
@@ -171,7 +192,11 @@ def inverse_dynamics(
     point = checked("about", about, (3,))
     wrench, tree_torque = _hanging(chain).evaluate(trajectory.q, trajectory.v, trajectory.a)
     tree_torque += friction_torque(chain, trajectory.v)
-    applied = _external(chain, external, n)
+    applied, attached = _external(chain, external, n), checked_springs(chain, springs)
+    if attached:
+        loops = loops_of(chain)
+        poses = loops.tree.poses(trajectory.q)
+        tree_torque -= spring_forces(chain, loops, attached, trajectory.q, trajectory.v, poses).force
     force, moment = -wrench[:, :3], -wrench[:, 3:]
     if applied:
         generalised, total = _applied(chain, trajectory, applied)
@@ -187,6 +212,7 @@ def inverse_dynamics(
         trajectory=trajectory,
         tree_torque=frozen(tree_torque),
         external=applied,
+        springs=attached,
     )
 
 
