@@ -356,6 +356,37 @@ def test_bad_requests_are_refused_with_what_is_known() -> None:
         problem.solve("distance")
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"limits": {"peak_torque": [1.0, 2.0, 3.0]}}, "one number, or 2"),
+        ({"limits": {"peak_torque": "much"}}, "numbers only"),
+        ({"limits": {"rms_torque": [1.0, 2.0]}}, "one positive and finite number"),
+        ({"minimise": {"added_mass": "much"}}, "numbers only"),
+        ({"minimise": ["added_mass"]}, "terms with their weights"),
+        ({"remove": "psi"}, "sequence of names"),
+        ({"region": 0.1}, "a Ball, a Box or an Ellipsoid"),
+        ({"motions": 3}, "motions or trajectories"),
+        ({"seed": -1}, "not negative"),
+    ],
+)
+def test_arguments_of_the_wrong_type_or_shape_are_named(options: dict[str, object], said: str) -> None:
+    """No numpy error leaks out of a public function."""
+    chain, path = case_I()
+    with pytest.raises(InvalidInputError, match=said):
+        balance(chain, "force", **{"motions": path, **options})  # type: ignore[arg-type]
+
+
+def test_objectives_without_weight_do_not_slow_or_change_a_solve() -> None:
+    """A problem prepared for many objectives answers as one prepared for a single one."""
+    chain, path = case_I()
+    many = ("added_mass", "peak_torque", "rms_shaking_moment", "distance")
+    problem = balance_problem(chain, "force", region=Ball(REACH), motions=path, objectives=many)
+    design = problem.solve({"added_mass": 1.0, "peak_torque": 0.0})
+    assert design.objective == pytest.approx(0.27, abs=1e-6)
+    assert design.terms["peak_torque"] == pytest.approx(np.abs(inverse_dynamics(design.chain, path).torque).max())
+
+
 def test_a_motion_that_leaves_the_range_says_where() -> None:
     chain, path = case_I()
     t = np.linspace(0.0, 1.0, 11)

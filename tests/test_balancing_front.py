@@ -133,13 +133,26 @@ def test_reactionless_designs_are_found_from_plain_rods() -> None:
         assert np.abs(loads.shaking_moment).max() <= 1e-11
 
 
-def test_without_a_configuration_the_branch_that_can_be_balanced_is_pointed_out() -> None:
-    """For all assembly modes together it is impossible, on the crossed branch it is not."""
-    chain, _ = antiparallelogram((0.05, 0.15, 0.05), (1.0 / 1200.0, 0.6 * 0.09 / 12.0, 1.0 / 1200.0))
+def test_without_a_configuration_the_branch_that_can_be_balanced_is_found_and_named() -> None:
+    """For all assembly modes together it is impossible, which stays proved; on the crossed branch it is not."""
+    chain, near = antiparallelogram((0.05, 0.15, 0.05), (1.0 / 1200.0, 0.6 * 0.09 / 12.0, 1.0 / 1200.0))
     design = balance(chain, "dynamic")
-    assert not design.feasible
+    assert design.feasible and design.branch is not None and design.certificate is not None
+    assert "only on the branch" in repr(design)
     assert len(design.alternatives) == 1
-    assert balance(chain, "dynamic", near=design.alternatives[0]).feasible
-    assert "possible on the branch" in repr(design)
+    loads = inverse_dynamics(design.chain, states(chain, near, 5.0, -20.0))
+    assert np.abs(loads.shaking_force).max() <= 1e-11 and np.abs(loads.shaking_moment).max() <= 1e-11
     generic = balance(mechanisms.four_bar(), "dynamic")
-    assert not generic.feasible and generic.alternatives == ()
+    assert not generic.feasible and generic.alternatives == () and generic.branch is None
+
+
+def test_a_design_is_for_the_branch_that_is_meant() -> None:
+    """The same lengths, uncrossed by home configuration or trajectory: no design, the other branch is named."""
+    home = fb.load(fb.io.shipped_path("four_bar_parallelogram"))
+    plain, _ = antiparallelogram((0.05, 0.15, 0.05), (1.0 / 1200.0, 0.6 * 0.09 / 12.0, 1.0 / 1200.0))
+    flat = np.array([1.0, -1.0, 1.0])
+    for design in (balance(home, "dynamic"), balance(plain, "dynamic", motions=states(plain, flat, 5.0, -20.0))):
+        assert not design.feasible
+        assert len(design.alternatives) == 1
+        assert balance(design.original, "dynamic", near=design.alternatives[0]).feasible
+        assert "possible on the branch" in repr(design)

@@ -94,16 +94,19 @@ class Program:
     """The constraints of one problem, assembled once and solved for many objectives."""
 
     def __init__(self, n: int, blocks: Sequence[Block]) -> None:
+        """Put blocks together; those with fewer than n columns leave the last variables alone."""
         order = {"zero": 0, "nonneg": 1, "soc": 2, "psd": 3}
         self.n = n
         self.blocks = sorted(blocks, key=lambda b: order[b.cone])
-        self.G = np.concatenate([b.G for b in self.blocks]) if blocks else np.zeros((0, n))
+        self.G = np.zeros((sum(b.g.size for b in self.blocks), n))
         self.g = np.concatenate([b.g for b in self.blocks]) if blocks else np.zeros(0)
         self.inward = np.concatenate(
             [np.zeros(b.g.size) if b.inward is None else b.inward for b in self.blocks] or [np.zeros(0)]
         )
         ends = np.cumsum([b.g.size for b in self.blocks])
         self.slices = [slice(int(e) - b.g.size, int(e)) for e, b in zip(ends, self.blocks, strict=True)]
+        for block, part in zip(self.blocks, self.slices, strict=True):
+            self.G[part, : block.G.shape[1]] = block.G
         self._sparse: object = None
 
     def solve(self, P: Array, q: Array, *, margin: float = 0.0, tolerance: float = 1e-8) -> Outcome:

@@ -19,6 +19,7 @@ from fivebar_pin.balancing._terms import (
     check_terms,
     linear_term,
     measure_of,
+    numbers,
     positive_limit,
     rows_term,
     torque_limits,
@@ -68,7 +69,7 @@ class TermMaker:
             if name == "peak_torque":
                 blocks += torque_limits(top, self.rows["torque"], self.full_E, self.pi0)
             else:
-                limit = positive_limit(name, float(np.asarray(top)))
+                limit = positive_limit(name, top)
                 root = np.sqrt(limit) if name.startswith("mean_square_") else limit
                 blocks += self.make(base(name)).bounded(float(root))
         return blocks
@@ -78,13 +79,16 @@ def weights_of(minimise: str | Mapping[str, float] | None, mode: str) -> dict[st
     """Return the terms and their weights, checked."""
     if minimise is None:
         minimise = "distance" if mode == "redesign" else "added_mass"
-    weights = {minimise: 1.0} if isinstance(minimise, str) else {str(k): float(v) for k, v in minimise.items()}
-    if not weights:
-        raise InvalidInputError("minimise", {}, "must name at least one term")
-    check_terms(weights, "objective")
-    for name, weight in weights.items():
-        if not (np.isfinite(weight) and weight >= 0.0):
-            raise InvalidInputError(f"weight of {name}", weight, "must be finite and not negative")
+    given = {minimise: 1.0} if isinstance(minimise, str) else minimise
+    if not isinstance(given, Mapping) or not given:
+        raise InvalidInputError("minimise", minimise, "must be a term, or terms with their weights {term: weight}")
+    check_terms(given, "objective")
+    weights = {}
+    for name, weight in given.items():
+        value = numbers(f"weight of {name}", weight)
+        if value.ndim or not (np.isfinite(value) and value >= 0.0):
+            raise InvalidInputError(f"weight of {name}", weight, "must be one finite number, not negative")
+        weights[name] = float(value)
     if not any(weights.values()):
         raise InvalidInputError("minimise", weights, "must have a positive weight")
     return weights

@@ -17,6 +17,7 @@ from fivebar_pin.kinematics import drive
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
+Motions = Motion | Trajectory | Sequence[Motion | Trajectory]
 MEASURES = ("torque", "shaking_force", "shaking_moment", "bearing_force", "angular_momentum")
 
 
@@ -54,10 +55,12 @@ class Rows:
 
 def trajectories(
     chain: ClosedChain,
-    motions: Motion | Trajectory | Sequence[Motion | Trajectory],
+    motions: Motions,
     near: npt.ArrayLike | None = None,
 ) -> tuple[Trajectory, ...]:
     """Return the trajectories of all motions; a motion is driven from `near`."""
+    if not isinstance(motions, (Motion, Trajectory, Sequence)):
+        raise InvalidInputError("motions", type(motions).__name__, "must be motions or trajectories, one or a list")
     given = [motions] if isinstance(motions, (Motion, Trajectory)) else list(motions)
     out = []
     for k, item in enumerate(given):

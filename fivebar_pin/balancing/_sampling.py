@@ -54,6 +54,10 @@ def random_samples(chain: ClosedChain, count: int, *, near: npt.ArrayLike | None
     """
     loops = loops_of(chain)
     loops.require_determined()
+    if not chain.na:
+        raise InvalidInputError("actuated joints", [], "must be at least one, else nothing moves")
+    if not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InvalidInputError("seed", seed, "must be an integer, not negative")
     rng = np.random.default_rng(seed)
     if near is None:
         q, good = _starts(chain, loops, rng)
@@ -135,12 +139,17 @@ def _limits(chain: ClosedChain, loops: Loops) -> Array:
     return out
 
 
+def closed_at(loops: Loops, q: Array) -> bool:
+    """Return whether a configuration (nq,) closes the loops, but for what rounding in a file leaves."""
+    residual = residual_of(loops, q[None])[0] if loops.m else np.zeros(1)
+    return bool(np.abs(residual).max() <= 1e-6 * max(1.0, loops.length))
+
+
 def _near(chain: ClosedChain, loops: Loops, near: npt.ArrayLike) -> Array:
     q = np.array(checked("near", near, (chain.nq,)))[None]
     if loops.m:
-        residual = residual_of(loops, q)[0]
-        if np.abs(residual).max() > 1e-6 * max(1.0, loops.length):
-            name, size = loops.worst(residual)
+        if not closed_at(loops, q[0]):
+            name, size = loops.worst(residual_of(loops, q)[0])
             raise AssemblyError(
                 f"the configuration near is not closed: closure {name} stays open by {size:.3g} m or rad. "
                 "Use assemble(chain, q_actuated) to close it.",

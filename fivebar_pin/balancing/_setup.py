@@ -77,6 +77,8 @@ class Setup:
 
     def removable(self, remove: Sequence[str]) -> list[int]:
         """Return the indices of the bodies that may lose material."""
+        if isinstance(remove, str):
+            raise InvalidInputError("remove", remove, "must be a sequence of names")
         for name in remove:
             if name not in self.chain.joints:
                 raise UnknownNameError("body", name, self.chain.joints)

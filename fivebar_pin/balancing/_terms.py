@@ -62,9 +62,8 @@ class Term:
         return max(float(np.linalg.norm(G @ y + g)) for G, g in self.vectors)
 
     def epigraph(self, column: int) -> list[Block]:
-        """Return the cones of scale * y[column] >= term."""
-        n = self.vectors[0][0].shape[1]
-        bound = np.zeros(n)
+        """Return the cones of scale * y[column] >= term, for a variable after those of the design."""
+        bound = np.zeros(column + 1)
         bound[column] = 1.0
         return self._below(bound, np.zeros(1), f"epigraph of {self.name}")
 
@@ -76,7 +75,7 @@ class Term:
     def _below(self, bound: Array, offset: Array, label: str) -> list[Block]:
         blocks, flat = [], []
         for G, g in self.vectors:
-            G, g = G / self.scale, g / self.scale
+            G, g = np.pad(G / self.scale, ((0, 0), (0, bound.size - G.shape[1]))), g / self.scale
             if self.signed:
                 flat.append((bound - G[0], offset - g))
             elif G.shape[0] == 1:
@@ -133,7 +132,10 @@ def rows_term(name: str, rows: Rows, E: Array, pi0: Array, present: Array) -> Te
 
 def torque_limits(limit: npt.ArrayLike, rows: Rows, E: Array, pi0: Array) -> list[Block]:
     """Return the cones of |torque of every motor| <= its limit; one limit for all motors or one for each."""
-    each = np.broadcast_to(np.asarray(limit, dtype=np.float64), (len(rows.groups),))
+    given = np.atleast_1d(numbers("limit of peak_torque", limit))
+    if given.shape not in ((1,), (len(rows.groups),)):
+        raise InvalidInputError("limit of peak_torque", given.tolist(), f"must be one number, or {len(rows.groups)}")
+    each = np.broadcast_to(given, (len(rows.groups),))
     G, g = rows.F @ E, rows.F @ pi0 + rows.f
     blocks = []
     for k, label in enumerate(rows.labels):
@@ -144,8 +146,17 @@ def torque_limits(limit: npt.ArrayLike, rows: Rows, E: Array, pi0: Array) -> lis
     return blocks
 
 
-def positive_limit(name: str, limit: float) -> float:
-    """Check a bound on a term."""
-    if not (np.isfinite(limit) and limit > 0.0):
-        raise InvalidInputError(f"limit of {name}", limit, "must be positive and finite")
-    return limit
+def positive_limit(name: str, limit: npt.ArrayLike) -> float:
+    """Return a bound on a term as a number, checked."""
+    value = numbers(f"limit of {name}", limit)
+    if value.ndim or not (np.isfinite(value) and value > 0.0):
+        raise InvalidInputError(f"limit of {name}", limit, "must be one positive and finite number")
+    return float(value)
+
+
+def numbers(name: str, given: npt.ArrayLike) -> Array:
+    """Return what a user gave as an array of numbers."""
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidInputError(name, given, "must hold numbers only") from None

@@ -6,52 +6,80 @@ antiparallelogram. Momentum may vanish along one without vanishing along the oth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fivebar_pin._arrays import Array, frozen
-from fivebar_pin.balancing._sampling import SpaceName, random_samples
+from fivebar_pin._loops import loops_of
+from fivebar_pin.balancing._quantities import Motions
+from fivebar_pin.balancing._sampling import SpaceName, closed_at, random_samples
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import FiveBarPinError
+from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["Branch", "branches"]
+__all__ = ["Branch", "branches", "configurations_meant"]
 
 _ROUGH = 1e-2  # part of a condition outside another row space that tells branches apart [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branch:
-    """A closed configuration (nq,) and the conditions on what can be reached from it."""
+    """What can be reached from one configuration without passing a singularity.
+
+    Attributes:
+        near: the configuration (nq,), closed.
+        conditions: on the inertial parameters, on this branch.
+        named: whether it was asked for.
+    """
 
     near: Array
     conditions: BalanceConditions
+    named: bool
 
 
 def branches(
-    chain: ClosedChain, together: BalanceConditions, *, tries: int = 4, seed: int = 0, **options: Any
+    chain: ClosedChain,
+    together: BalanceConditions,
+    *,
+    named: Sequence[Array] = (),
+    tries: int = 4,
+    seed: int = 0,
+    **options: Any,
 ) -> tuple[Branch, ...]:
-    """Return the branches found that have fewer conditions than all assembly modes together, fewest first.
+    """Return the branches found that have fewer conditions than all assembly modes together.
+
+    Those of the named configurations come first, the others with the fewest conditions first.
 
     Args:
         chain: the mechanism.
         together: its conditions on all assembly modes.
+        named: closed configurations (nq,) whose branches are asked for.
         tries: number of random configurations to start from.
         seed: of the configurations.
         **options: gravity, about, as for `balance_conditions`.
     """
     found: list[Branch] = []
     space: SpaceName = "planar" if together.space.planar else "spatial"
-    for q in random_samples(chain, 10, seed=seed).q[:tries]:
+    starts = [*named, *random_samples(chain, 10, seed=seed).q[:tries]]
+    for k, q in enumerate(starts):
         try:
             own = balance_conditions(chain, together.kind, near=q, space=space, seed=seed, **options)
         except FiveBarPinError:
             continue  # a stretch too short to decide a rank: nothing to be gained there
         if own.rank < together.rank and not any(_alike(own, b.conditions) for b in found):
-            found.append(Branch(frozen(q), own))
-    return tuple(sorted(found, key=lambda b: b.conditions.rank))
+            found.append(Branch(frozen(q), own, k < len(named)))
+    return tuple(sorted(found, key=lambda b: (not b.named, b.conditions.rank)))
+
+
+def configurations_meant(chain: ClosedChain, motions: Motions) -> tuple[Array, ...]:
+    """Return where given trajectories start, else the model's reference configurations that close the loops (nq,)."""
+    given = motions if isinstance(motions, Sequence) else (motions,)
+    starts = tuple(path.q[0] for path in given if isinstance(path, Trajectory))
+    return starts or tuple(q for q in chain.references.values() if closed_at(loops_of(chain), q))
 
 
 def _alike(a: BalanceConditions, b: BalanceConditions) -> bool:

@@ -130,7 +130,7 @@ def realise(
     if shape != "ball" and not space.planar:
         raise InvalidInputError("shape", shape, "needs a planar mechanism", "Use shape='ball'.")
     thick = 0.2 * design.original.length if thickness is None else thickness
-    if not (np.isfinite(thick) and thick > 0.0):
+    if not (isinstance(thick, (int, float, np.number)) and np.isfinite(thick) and thick > 0.0):
         raise InvalidInputError("thickness", thickness, "must be positive and finite [m]")
     made = [_make(c, space, shape, density, float(thick)) for c in design.added if c.mass > 0.0]
     return Realisation(design, tuple(made))
@@ -198,7 +198,7 @@ def _density(material: str | float) -> float:
         if material not in MATERIALS:
             raise UnknownNameError("material", material, MATERIALS)
         return MATERIALS[material]
-    if not (np.isfinite(material) and material > 0.0):
+    if not (isinstance(material, (int, float, np.number)) and np.isfinite(material) and material > 0.0):
         raise InvalidInputError("density", material, "must be positive and finite [kg/m3]")
     return float(material)
 

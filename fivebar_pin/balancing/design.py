@@ -56,9 +56,11 @@ class Design:
         parameters: inertial parameters of all bodies (nb, 10); nan when infeasible.
         added, removed: material per body that may change; for a redesign, `added` holds the new bodies.
         rows: the quantities along the given motions, for `before` and `after`.
-        certificate: proof of infeasibility, else None.
-        alternatives: configurations (nq,) of branches on which there is a design although there is none for all
-            assembly modes together; pass one as `near`.
+        certificate: proof of infeasibility, else None; of a design for one branch, the proof that there is none for all
+            assembly modes together.
+        branch: configuration (nq,) of the branch that the design is for; None when it serves all assembly modes.
+        alternatives: configurations (nq,) of all branches with a design of their own, found where there is none for
+            all assembly modes together; pass one as `near`.
     """
 
     status: str
@@ -75,15 +77,17 @@ class Design:
     removed: tuple[Change, ...] = ()
     rows: Mapping[str, Rows] = field(default_factory=dict)
     certificate: Certificate | None = None
+    branch: Array | None = None
     alternatives: tuple[Array, ...] = ()
 
     def __repr__(self) -> str:
         if not self.feasible:
             hint = "".join(f"; possible on the branch near={q.round(6).tolist()} alone" for q in self.alternatives)
             return f"Design({self.original.name!r}, {self.kind}: infeasible; {self.certificate}{hint})"
+        where = "" if self.branch is None else f", only on the branch of {self.branch.round(6).tolist()}"
         return (
             f"Design({self.original.name!r}, {self.kind}: {self.status}, objective {self.objective:.6g}, "
-            f"gap {self.gap:.1e}, residual {self.residual:.1e})"
+            f"gap {self.gap:.1e}, residual {self.residual:.1e}{where})"
         )
 
     def __str__(self) -> str:

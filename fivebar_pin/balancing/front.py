@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, frozen
+from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._terms import check_terms
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.optimum import balance
-from fivebar_pin.balancing.problem import BalanceProblem, Motions, balance_problem
+from fivebar_pin.balancing.problem import BalanceProblem, balance_problem
 from fivebar_pin.balancing.scoring import score
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.errors import InfeasibleError, InvalidInputError
+from fivebar_pin.errors import InfeasibleError, InvalidInputError, UnknownNameError
 
 __all__ = ["Comparison", "ParetoFront", "alici_shirinzadeh", "compare", "pareto"]
 
@@ -123,6 +124,9 @@ def alici_shirinzadeh(
     """
     names = ("bearing_force", "torque", "shaking_moment", "angular_momentum")
     given = dict.fromkeys(names, 1.0) if weights is None else dict(weights)
+    for name in given:
+        if name not in names:
+            raise UnknownNameError("weight", name, names)
     minimise = {f"mean_square_{name}": weight for name, weight in given.items()}
     return balance(chain, kind, minimise=minimise, motions=motions, **options)
 

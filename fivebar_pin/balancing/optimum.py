@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy.typing as npt
 
 from fivebar_pin.balancing._objective import weights_of
+from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._sampling import SpaceName
 from fivebar_pin.balancing._setup import MassBounds
-from fivebar_pin.balancing.branches import branches
+from fivebar_pin.balancing.branches import Branch, branches, configurations_meant
+from fivebar_pin.balancing.conditions import balance_conditions
 from fivebar_pin.balancing.design import Design
-from fivebar_pin.balancing.problem import Motions, balance_problem
+from fivebar_pin.balancing.problem import balance_problem
 from fivebar_pin.balancing.regions import Disc, Region
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import SolverError
 
 __all__ = ["balance"]
 
@@ -63,7 +66,11 @@ def balance(
         gravity, about, near, space, seed: as for `balance_conditions`.
 
     Returns:
-        The design; ask its `feasible`, `chain`, `certificate`.
+        The design; ask its `feasible`, `chain`, `certificate`. Special lengths (antiparallelograms, kites) may leave no
+        design for all assembly modes together, but one for a single branch. Then the design is for that branch,
+        `design.branch` says which, and the certificate proves that none serves all of them. Where trajectories are
+        given, or else the model has closed reference configurations, the design is for one of their branches or
+        infeasible; other branches are listed as alternatives.
 
     Raises:
         UnknownNameError: a kind, body, term or mode that does not exist.
@@ -94,8 +101,43 @@ def balance(
         )
         return problem.solve(terms)
 
-    design = solved(near)
-    if design.feasible or design.conditions is None or near is not None:
-        return design
-    found = [b.near for b in branches(chain, design.conditions, seed=seed, gravity=gravity, about=about)]
-    return replace(design, alternatives=tuple(q for q in found if solved(q).feasible))
+    if near is not None or kind is None:
+        return solved(near)
+    together: Design | SolverError
+    try:
+        together = solved(None)
+        if together.feasible:
+            return together
+    except SolverError as error:
+        together = error
+    conditions = balance_conditions(chain, kind, gravity=gravity, about=about, space=space, seed=seed)
+    named = configurations_meant(chain, motions)
+    found = branches(chain, conditions, named=named, seed=seed, gravity=gravity, about=about)
+    return _on_one_branch(together, found, solved, any_branch=not named)
+
+
+def _on_one_branch(
+    together: Design | SolverError,
+    found: Sequence[Branch],
+    solved: Callable[[npt.ArrayLike | None], Design],
+    *,
+    any_branch: bool,
+) -> Design:
+    """Return the best design for a single branch that is meant, or what became of all of them together."""
+    possible = []
+    for branch in found:
+        try:
+            design = solved(branch.near)
+        except SolverError:
+            continue  # neither a design nor a proof there
+        if design.feasible:
+            possible.append((branch, design))
+    others = tuple(branch.near for branch, _ in possible)
+    meant = [design for branch, design in possible if branch.named or any_branch]
+    if meant:
+        best = min(meant, key=lambda design: design.objective)
+        certificate = together.certificate if isinstance(together, Design) else None
+        return replace(best, certificate=certificate, alternatives=others)
+    if isinstance(together, SolverError):
+        raise together
+    return replace(together, alternatives=others)

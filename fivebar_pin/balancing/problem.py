@@ -21,30 +21,22 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
 from fivebar_pin.balancing import _lift
-from fivebar_pin.balancing._conic import Block, Outcome, Program
+from fivebar_pin.balancing._conic import Block, Certificate, Outcome, Program
 from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing._objective import TermMaker, weights_of
 from fivebar_pin.balancing._parameters import Space
-from fivebar_pin.balancing._quantities import MEASURES, Rows, measure, trajectories
+from fivebar_pin.balancing._quantities import MEASURES, Motions, Rows, measure, trajectories
 from fivebar_pin.balancing._sampling import SpaceName, random_samples, space_of
 from fivebar_pin.balancing._setup import MassBounds, Setup
-from fivebar_pin.balancing._terms import (
-    Term,
-    base,
-    check_terms,
-    measure_of,
-)
+from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, positive_limit
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.regions import Disc, Region
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError, UnknownNameError
-from fivebar_pin.motion import Motion
-from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["BalanceProblem", "balance_problem"]
 
-Motions = Motion | Trajectory | Sequence[Motion | Trajectory]
 _MARGINS = (1e-9, 1e-8, 1e-7, 0.0)  # how far inside the cones a design is kept, as a share of the moving mass
 _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
@@ -58,9 +50,17 @@ class BalanceProblem:
     Attributes:
         chain, kind, conditions: what is balanced.
         space: the parameters of the problem.
+        mode: "add" or "redesign".
         materials: pieces of material that are variables.
         terms: objectives by base name.
         rows: quantities along the motions.
+        limits: upper bounds, as given.
+        E, X0: scaled parameters (nb * width,) = X0 + E y, y the variables (n,) of all materials.
+        program: conditions, physical bodies, regions, bounds.
+        fixed: rows (k, n + 1) of masses that are given exactly.
+        caps: bounds on added masses that have none of their own.
+        mass: unit of mass [kg].
+        near: configuration (nq,) of the one branch that is balanced, or None.
     """
 
     chain: ClosedChain
@@ -78,6 +78,7 @@ class BalanceProblem:
     fixed: Array = field(repr=False)
     caps: tuple[Block, ...] = field(repr=False)
     mass: float
+    near: Array | None
 
     @property
     def n(self) -> int:
@@ -100,38 +101,57 @@ class BalanceProblem:
         for name in (*weights, *(limits or {})):
             if base(name) not in self.terms:
                 raise UnknownNameError("prepared objective", name, self.terms)
-        P, q, unit = self._objective(weights)
-        extra = [b for name, top in (limits or {}).items() for b in self.terms[base(name)].bounded(float(top))]
-        free = Program(self.program.n, [*self.program.blocks, *extra]) if extra else self.program
-        program = Program(self.program.n, [*free.blocks, *self.caps]) if self.caps else free
-        problem = "the design could not be made exact"
+        limited = [
+            block
+            for name, top in (limits or {}).items()
+            for block in self.terms[base(name)].bounded(positive_limit(name, top))
+        ]
+        bounds = [*self.program.blocks, *limited]
+        P, q, unit, epigraphs = self._objective(weights)
+        program = Program(P.size, [*bounds, *self.caps, *epigraphs])
+        problem = ""
         for margin in _MARGINS:
             outcome = program.solve(P, q, margin=margin)
             if outcome.x is None:
                 outcome = program.solve(P, q)
-                if outcome.x is None:  # a proof that does without the caps says more
-                    unbounded = free.solve(0.0 * P, 0.0 * q)
-                    return self._infeasible(unbounded if unbounded.x is None else outcome)
-            design, problem = self._finish(outcome, program, weights, (P, q, unit))
+                if outcome.x is None:
+                    return self._infeasible(self._proof(bounds) or outcome.certificate)
+            design, problem = self._finish(outcome, program, weights, (P, unit))
             if design is not None:
                 return design
-        raise SolverError(problem)
+        raise SolverError(
+            f"neither a design nor a proof that there is none: the closest one {problem}. It may exist only where "
+            "bodies shrink to points, or only as a limit. Loosen the bounds or the regions."
+        )
 
-    def _objective(self, weights: Mapping[str, float]) -> tuple[Array, Array, float]:
-        """Return P, q over all variables and the unit they were divided by."""
-        P, q = np.zeros(self.program.n), np.zeros(self.program.n)
+    def _proof(self, bounds: Sequence[Block]) -> Certificate | None:
+        """Return a proof that does without the caps on masses, which says more, if there is one."""
+        try:
+            return Program(self.n, bounds).solve(np.zeros(self.n), np.zeros(self.n)).certificate
+        except SolverError:
+            return None
+
+    def _objective(self, weights: Mapping[str, float]) -> tuple[Array, Array, float, list[Block]]:
+        """Return P, q over all variables, the unit they were divided by, and the epigraphs of the terms that count.
+
+        Every such term gets one variable after those of the material.
+        """
+        used = list(dict.fromkeys(base(name) for name, weight in weights.items() if weight > 0.0))
+        P, q = np.zeros(self.n + len(used)), np.zeros(self.n + len(used))
         for name, weight in weights.items():
-            term = self.terms[base(name)]
-            column = self.n + list(self.terms).index(base(name))
-            if name.startswith("mean_square_"):
-                P[column] += 2.0 * weight * term.scale**2
-            else:
-                q[column] += weight * term.scale
+            if weight > 0.0:
+                term = self.terms[base(name)]
+                column = self.n + used.index(base(name))
+                if name.startswith("mean_square_"):
+                    P[column] += 2.0 * weight * term.scale**2
+                else:
+                    q[column] += weight * term.scale
         unit = float(max(P.max(initial=0.0), q.max(initial=0.0))) or 1.0
-        return P / unit, q / unit, unit
+        blocks = [b for k, name in enumerate(used) for b in self.terms[name].epigraph(self.n + k)]
+        return P / unit, q / unit, unit, blocks
 
     def _finish(
-        self, outcome: Outcome, program: Program, weights: Mapping[str, float], cost: tuple[Array, Array, float]
+        self, outcome: Outcome, program: Program, weights: Mapping[str, float], cost: tuple[Array, float]
     ) -> tuple[Design | None, str]:
         """Make a solution exact and check it; None and the reason when it is not physical."""
         assert outcome.x is not None
@@ -142,14 +162,13 @@ class BalanceProblem:
                 break
         else:
             return None, (
-                f"the design misses the conditions by {residual:.2g} ({_EXACT:g} is allowed) and its least physical "
-                f"body is outside by {max(0.0, -parts.lowest):.2g} ({_PHYSICAL:g})"
+                f"misses the conditions by {residual:.2g} ({_EXACT:g} is allowed) and its least physical body by "
+                f"{max(0.0, -parts.lowest):.2g} ({_PHYSICAL:g})"
             )
-        full = np.concatenate([y, np.zeros(len(self.terms))])
-        values = {name: self.terms[base(name)].value(full) for name in weights}
+        values = {name: self.terms[base(name)].value(y) for name in weights}
         squared = {k: v * v if k.startswith("mean_square_") else v for k, v in values.items()}
         objective = sum(weights[k] * squared[k] for k in weights)
-        P, _, unit = cost
+        P, unit = cost
         x = outcome.x
         dual = unit * (-float(program.g @ outcome.z) - 0.5 * float(x @ (P * x)))
         design = Design(
@@ -166,6 +185,7 @@ class BalanceProblem:
             added=parts.added,
             removed=parts.removed,
             rows=self.rows,
+            branch=self.near,
         )
         return design, ""
 
@@ -190,7 +210,7 @@ class BalanceProblem:
             y = y - share * np.linalg.lstsq(A * share, A @ y + b, rcond=1e-10)[0]
         return y, float(np.abs(A @ y + b).max(initial=0.0)) / max(1.0, float(np.abs(y).max(initial=0.0)))
 
-    def _infeasible(self, outcome: Outcome) -> Design:
+    def _infeasible(self, certificate: Certificate | None) -> Design:
         nothing = np.full_like(self.chain.inertial_parameters, np.nan)
         return Design(
             status="infeasible",
@@ -203,7 +223,7 @@ class BalanceProblem:
             dual_bound=float("inf"),
             terms={},
             parameters=frozen(nothing),
-            certificate=outcome.certificate,
+            certificate=certificate,
         )
 
 
@@ -255,17 +275,9 @@ def balance_problem(
     full_E, full_0 = to_pi @ (unit * E), start + to_pi @ (unit[:, 0] * X0)
     names = list(dict.fromkeys(base(t) for t in objectives))
     n = E.shape[1]
-
-    def padded(G: Array) -> Array:
-        return np.concatenate([G, np.zeros((*G.shape[:-1], len(names)))], axis=-1)
-
-    maker = TermMaker(chain, setup, rows, paths, padded(E), X0, padded(full_E), full_0)
+    maker = TermMaker(chain, setup, rows, paths, E, X0, full_E, full_0)
     terms = {name: maker.make(name) for name in names}
-    blocks = setup.constraints(materials, E, X0, masses)
-    blocks = [Block(b.label, b.cone, padded(b.G), b.g, b.inward) for b in blocks]
-    for k, term in enumerate(terms.values()):
-        blocks += term.epigraph(n + k)
-    blocks += maker.limits(limits or {})
+    blocks = setup.constraints(materials, E, X0, masses) + maker.limits(limits or {})
     return BalanceProblem(
         chain=chain,
         kind=kind,
@@ -278,8 +290,9 @@ def balance_problem(
         limits=dict(limits or {}),
         E=frozen(E),
         X0=frozen(X0),
-        program=Program(n + len(names), blocks),
+        program=Program(n, blocks),
         fixed=frozen(setup.fixed(materials, masses, n)),
-        caps=tuple(Block(b.label, b.cone, padded(b.G), b.g) for b in setup.caps(materials, masses, n)),
+        caps=tuple(setup.caps(materials, masses, n)),
         mass=setup.mass,
+        near=None if near is None else checked("near", near, (chain.nq,)),
     )

@@ -170,6 +170,8 @@ def resolve(region: Region, chain: ClosedChain, body: int, axes: Array, *, plana
         UnknownNameError: a frame that the body does not have.
         InvalidInputError: a box that stands askew to the plane of the mechanism.
     """
+    if not isinstance(region, Region):
+        raise InvalidInputError(f"region of body {chain.joints[body]}", region, "must be a Ball, a Box or an Ellipsoid")
     R, p = _placement(region.frame, chain, body)
     center = p + R @ np.asarray(region.center)
     kind = type(region).__name__.lower()

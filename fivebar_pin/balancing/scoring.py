@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
-from fivebar_pin.balancing._quantities import Rows, measure, reflected_inertia, trajectories
-from fivebar_pin.balancing._terms import LINEAR, TERMS, base, check_terms, measure_of
+from fivebar_pin.balancing._quantities import Motions, Rows, measure, reflected_inertia, trajectories
+from fivebar_pin.balancing._terms import LINEAR, TERMS, base, check_terms, measure_of, numbers
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Scores", "score"]
@@ -55,7 +54,7 @@ class Scores:
 
 def score(
     chain: ClosedChain,
-    motions: Motion | Trajectory | Sequence[Motion | Trajectory],
+    motions: Motions,
     designs: npt.ArrayLike,
     *,
     terms: Sequence[str] = ("rms_shaking_force", "rms_shaking_moment", "rms_torque"),
@@ -173,7 +172,7 @@ def _peak(rows: Rows, x: Array) -> Array:
 
 
 def _designs(chain: ClosedChain, designs: npt.ArrayLike) -> Array:
-    X = np.asarray(designs, dtype=np.float64)
+    X = numbers("designs", designs)
     nb = len(chain.joints)
     X = X[None] if X.ndim == 2 else X
     if X.ndim != 3 or X.shape[1:] != (nb, 10):
