@@ -84,3 +84,50 @@ def _home(chain: fb.ClosedChain) -> np.ndarray:
     q = next(iter(chain.references.values()))
     at = [chain.model.joints[chain.model.getJointId(name)].idx_q for name in chain.actuated]
     return q[at]
+
+
+EQUALITIES = {
+    "connect": '<connect body1="b" body2="d" anchor="0.1 0.2 -0.3"/>',
+    "connect to the world": '<connect body1="b" anchor="0.1 0.2 -0.3"/>',
+    "weld as they are": '<weld body1="d" body2="b"/>',
+    "weld with relpose": '<weld body1="b" body2="d" relpose="0.3 -0.2 0.5 0.7 0.1 -0.4 0.2"/>',
+    "weld at an anchor": '<weld body1="b" body2="d" anchor="0.2 0.1 0.4"/>',
+    "weld with both": '<weld body1="b" body2="d" anchor="0.2 0.1 0.4" relpose="0.3 -0.2 0.5 0.7 0.1 -0.4 0.2"/>',
+}
+
+
+@pytest.mark.parametrize("equality", EQUALITIES.values(), ids=EQUALITIES.keys())
+def test_closures_are_open_by_what_mujoco_says(equality: str, tmp_path: Path) -> None:
+    """At any configuration the gap of an equality is the one MuJoCo finds, under nested classes and other units."""
+    inertial = '<inertial pos="0.1 0.2 0" euler="10 20 30" mass="2" diaginertia="0.1 0.2 0.25"/>'
+    text = f"""<mujoco><compiler angle="degree" eulerseq="ZyX"/>
+    <default><joint armature="0.1"/><default class="outer"><joint damping="0.3"/>
+      <default class="inner"><joint frictionloss="0.2"/></default></default></default>
+    <worldbody><body name="a" pos="0.1 0 0.3" euler="20 30 40" childclass="outer">{inertial}
+      <joint name="ja" axis="0 1 2"/>
+      <body name="b" pos="0.4 0.1 0" axisangle="1 2 3 50">{inertial}
+        <joint name="jb" class="inner" pos="0.1 0 0.2"/></body></body>
+    <body name="c" pos="1 0 0" xyaxes="0 1 0 -1 0 1">{inertial}<joint name="jc" type="slide" axis="1 0 1"/>
+      <body name="d" childclass="inner" pos="0.2 0 0.3" zaxis="1 1 1">{inertial}
+        <joint name="jd"/></body></body></worldbody>
+    <equality>{equality}</equality><actuator><motor joint="ja"/></actuator></mujoco>"""
+    (tmp_path / "model.xml").write_text(text)
+    chain, model = fb.load(tmp_path / "model.xml"), mujoco.MjModel.from_xml_string(text)
+    data, columns = mujoco.MjData(model), _columns(chain, model)
+    data.qpos[:], data.qvel[:] = [0.3, -0.7, 0.2, 1.1], [1.0, -0.5, 0.4, 0.8]
+    mujoco.mj_forward(model, data)
+    q, v = np.zeros(4), np.zeros(4)
+    q[columns], v[columns] = data.qpos, data.qvel
+    gap = fb.closure_residual(chain, q)
+    rows = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    theirs = data.efc_pos[rows]
+    assert gap.shape == theirs.shape
+    assert np.linalg.norm(gap[:3]) == pytest.approx(np.linalg.norm(theirs[:3]), abs=1e-14)
+    # MuJoCo measures a turn by the vector part of the quaternion; the sine of half of ours is its length.
+    assert np.sin(0.5 * np.linalg.norm(gap[3:])) == pytest.approx(np.linalg.norm(theirs[3:]), abs=1e-14)
+    for ours, theirs in (
+        (chain.model.damping, model.dof_damping),
+        (chain.model.armature, model.dof_armature),
+        (chain.model.upperDryFrictionLimit, model.dof_frictionloss),
+    ):
+        np.testing.assert_array_equal(np.array(ours)[columns], theirs)

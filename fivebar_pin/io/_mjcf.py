@@ -210,8 +210,10 @@ class _Equality:
             name = element.get("name") or f"{element.tag}_{k}"
             where = f"{element.tag} {name!r}"
             if element.tag not in ("connect", "weld"):
-                what = "couples coordinates" if element.tag == "joint" else "is"
-                raise self.reader.fail(where, f"{what} not as a closure of two frames; not supported, remove it")
+                what = {"joint": "couples the coordinates of joints", "tendon": "couples tendons"}.get(
+                    element.tag, "is"
+                )
+                raise self.reader.fail(where, f"{what}, not two frames; only connect and weld are supported, remove it")
             full = self.reader.with_defaults(element, None)
             if full.get("active", "true") != "true":
                 raise self.reader.fail(where, "is not active; remove it or make it active")
@@ -260,11 +262,12 @@ class _Equality:
         return self.bodies.frame(f"{name}_1", links[0], one), self.bodies.frame(f"{name}_2", links[1], two)
 
     def weld(self, element: ElementTree.Element, first: Array, second: Array, where: str) -> tuple[Array, Array]:
-        """Return the frames that a weld makes coincide: body 2 at its relpose in body 1, moved to the anchor."""
+        """Return the frames that a weld makes coincide.
+
+        On body 2 the anchor; on body 1 the relpose, which is where MuJoCo holds the anchor, or where it is now.
+        """
         values = np.array(self.reader.numbers(element, "relpose", 7, where, [0.0] * 7))
         anchor = homogeneous(np.array(self.reader.numbers(element, "anchor", 3, where, [0.0] * 3)), np.eye(3))
         if np.any(values[3:]):
-            relative = homogeneous(values[:3], quaternion_matrix(self.reader.unit(values[3:], "relpose", where)))
-        else:
-            relative = np.linalg.inv(first) @ second
-        return relative @ anchor, anchor
+            return homogeneous(values[:3], quaternion_matrix(self.reader.unit(values[3:], "relpose", where))), anchor
+        return np.linalg.inv(first) @ second @ anchor, anchor

@@ -130,7 +130,7 @@ class BodyTree:
             raise reader.fail(where, "a free joint must be the only one of its body")
         for spring in ("stiffness", "ref", "springdamper"):
             if any(float(x) for x in _plain(reader, element, spring, where)):
-                raise reader.fail(where, f"{spring} is not supported; remove it and add springs when simulating")
+                raise reader.fail(where, f"{spring} is not supported; remove it and pass springs=... instead")
         position = np.array(reader.numbers(element, "pos", 3, where, [0.0, 0.0, 0.0]))
         if word == "free":
             return np.zeros(3), _KINDS[word], np.array([0.0, 0.0, 1.0])
