@@ -12,6 +12,7 @@ from fivebar_pin import closure_residual, io, paper
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure
+from fivebar_pin.io._build import joint_model
 from fivebar_pin.io._tree import matrix_to_rpy, rpy_to_matrix
 
 ROBOTS = Path(pin.__file__).parents[4] / "share" / "example-robot-data" / "robots"
@@ -43,7 +44,7 @@ def random_chain(seed: int, *, names: str = "dcabe") -> ClosedChain:
         pin.JointModelRZ(),
         pin.JointModelRevoluteUnaligned(unit),
         pin.JointModelPX(),
-        pin.JointModelRUBY(),
+        joint_model("continuous", unit) if seed % 2 else pin.JointModelRUBY(),
         pin.JointModelPrismaticUnaligned(unit),
     ]
     model, parents = pin.Model(), (0, 1, 2, 0, 4)
@@ -236,6 +237,20 @@ def test_the_order_inside_a_pair_does_not_matter(tmp_path: Path) -> None:
     assert "[[O3_link2, O3_link3]]" in text
     sidecar.write_text(text.replace("[[O3_link2, O3_link3]]", "[[O3_link3, O3_link2]]").replace("3d", "3D"))
     assert io.load(urdf).closures[0].frames == ("O3_link3", "O3_link2")
+
+
+def test_a_continuous_joint_turns_about_any_axis(tmp_path: Path) -> None:
+    """An oblique axis in the file is the axis the joint turns about; q holds its cosine and sine."""
+    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    (tmp_path / "r.urdf").write_text(
+        f'<robot name="r"><link name="b"/><link name="l">{link}</link><joint name="j" type="continuous">'
+        '<parent link="b"/><child link="l"/><origin xyz="0 0 1"/><axis xyz="1 2 -2"/></joint></robot>'
+    )
+    chain = io.load(tmp_path / "r.urdf", closures=(), actuated=("j",))
+    assert (chain.nq, chain.nv) == (2, 1)
+    data = chain.model.createData()
+    pin.forwardKinematics(chain.model, data, np.array([np.cos(0.7), np.sin(0.7)]))
+    np.testing.assert_allclose(data.oMi[1].rotation, pin.exp3(0.7 * np.array([1.0, 2.0, -2.0]) / 3.0), atol=1e-15)
 
 
 def test_closure_frames_named_like_their_joints_survive_the_files(tmp_path):

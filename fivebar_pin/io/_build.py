@@ -25,9 +25,10 @@ _ALIGNED = {
 }
 _UNALIGNED = {
     "revolute": pin.JointModelRevoluteUnaligned,
-    "continuous": pin.JointModelRevoluteUnboundedUnaligned,
     "prismatic": pin.JointModelPrismaticUnaligned,
 }
+_OBLIQUE = """<robot name="one"><link name="a"/><link name="b"/><joint name="j" type="continuous">
+<parent link="a"/><child link="b"/><axis xyz="{} {} {}"/></joint></robot>"""
 _OTHERS = {
     "floating": pin.JointModelFreeFlyer,
     "planar": pin.JointModelPlanar,
@@ -208,6 +209,8 @@ def joint_model(kind: str, axis: Array) -> object:
     which = _AXES.get((float(axis[0]), float(axis[1]), float(axis[2])))
     if which is not None:
         return _ALIGNED[kind][which]()
+    if kind == "continuous":  # Python cannot give this one an axis; Pinocchio's own reader can
+        return pin.buildModelFromXML(_OBLIQUE.format(*(repr(float(x)) for x in axis))).joints[1]
     return _UNALIGNED[kind](np.array(axis))
 
 

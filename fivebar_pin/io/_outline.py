@@ -70,7 +70,7 @@ def _kind(model: pin.Model, j: int) -> tuple[str, Array]:
     if short in _OTHER_KINDS:
         return _OTHER_KINDS[short], np.array([0.0, 0.0, 1.0])
     if short in _UNALIGNED_KINDS:
-        return _UNALIGNED_KINDS[short], np.array(joint.extract().axis, dtype=np.float64)
+        return _UNALIGNED_KINDS[short], _axis(model, joint)
     if short[:-1] in _AXIS_KINDS and short[-1] in "XYZ":
         return _AXIS_KINDS[short[:-1]], np.eye(3)["XYZ".index(short[-1])]
     raise InvalidInputError(
@@ -171,6 +171,15 @@ class _Outline:
             pose = np.array(f.placement.homogeneous) @ visual.placement
             moved = Visual(link, visual.shape, visual.size, pose, visual.rgba, visual.mesh)
             self.visuals.setdefault(link, []).append(moved)
+
+
+def _axis(model: pin.Model, joint: pin.JointModel) -> Array:
+    """Return the axis of an oblique joint; Python sees that of an unbounded one in its motion subspace alone."""
+    if joint.nq == joint.nv:
+        return np.array(joint.extract().axis, dtype=np.float64)
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    return np.array(data.S, dtype=np.float64).reshape(6)[3:]
 
 
 def _is_identity(placement: pin.SE3) -> bool:
