@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,7 +15,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin import paper, viz
 from fivebar_pin.errors import InvalidInputError, OutputError
-from fivebar_pin.viz import _geometry
+from fivebar_pin.viz import _geometry, scene
 
 
 @pytest.fixture(scope="module")
@@ -182,3 +183,23 @@ def test_long_trajectories_are_thinned_to_what_a_screen_shows(shown: viz.Shown) 
 
     small, large = len(viz.page([sampled(100)])), len(viz.page([sampled(10_000)]))
     assert large - small < 500_000  # bytes; the line of the trace keeps every sample
+
+
+@pytest.mark.parametrize("stored", [False, True])
+def test_counterweights_are_named_by_their_bodies_in_one_entry(
+    linkage: paper.FiveBar, tmp_path: Path, stored: bool
+) -> None:
+    """They share a colour, so they share an entry; it survives a file, and no link loses its own shape or name."""
+    from fivebar_pin import balancing
+    from fivebar_pin.viz import _page
+
+    bare = replace(linkage.chain(), visuals=())
+    for chain in (linkage.chain(), bare):
+        design = fb.balance(chain, "force", region=balancing.Ball(0.1))
+        heavier = balancing.realise(design).chain
+        if stored:
+            fb.save(heavier, tmp_path / f"{len(chain.visuals)}.urdf")
+            heavier = fb.load(tmp_path / f"{len(chain.visuals)}.urdf")
+        shown = viz.Shown.at(heavier, linkage.configuration(0.3, 1.5))
+        legend = [entry["text"] for entry in _page._legend(scene._drawings([shown], 1.0, True))]
+        assert legend[:5] == ["link1", "link2", "link3", "link4", "counterweight on link1, link2, link4"]

@@ -35,7 +35,7 @@ MATERIALS: Mapping[str, float] = {
     "tungsten": 19250.0,
 }  # densities [kg/m3]
 SHAPES = ("disc", "bar", "ball")
-_COLOUR = (0.86, 0.36, 0.10, 1.0)
+COLOUR = (0.86, 0.36, 0.10, 1.0)  # of every counterweight: by it the viewer knows them, in files too
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,7 +225,7 @@ def _visual(chain: ClosedChain, w: Counterweight) -> Visual:
     assert frame is not None
     placement = np.asarray(frame.placement.inverse().homogeneous) @ w.pose
     if w.shape == "ball":
-        return Visual(frame.name, "sphere", w.size, placement, _COLOUR)
+        return Visual(frame.name, "sphere", w.size, placement, COLOUR)
     a, b, t = w.size
     size = (a, t) if w.shape == "disc" else (a, b, t)
-    return Visual(frame.name, "cylinder" if w.shape == "disc" else "box", size, placement, _COLOUR)
+    return Visual(frame.name, "cylinder" if w.shape == "disc" else "box", size, placement, COLOUR)

@@ -17,7 +17,17 @@ from fivebar_pin.viz._record import Colour
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain, Visual
 
-__all__ = ["COLOURS", "LINK_COLOURS", "Drawing", "amid_ground", "body_names", "ground_closures", "reach", "safe"]
+__all__ = [
+    "COLOURS",
+    "LINK_COLOURS",
+    "Drawing",
+    "amid_ground",
+    "body_names",
+    "ground_closures",
+    "is_counterweight",
+    "reach",
+    "safe",
+]
 
 LINK_COLOURS: tuple[Colour, ...] = (
     (0.00, 0.45, 0.70, 1.0),
@@ -77,6 +87,13 @@ class Drawing:
     def visuals(self) -> tuple[Visual, ...]:
         """Shapes of the chain that can be drawn: a mesh whose file is missing is left out."""
         return tuple(v for v in self.chain.visuals if v.shape != "mesh" or Path(v.mesh).is_file())
+
+
+def is_counterweight(visual: Visual) -> bool:
+    """Return whether a shape is a counterweight that `balancing.realise` has made: by its colour, also from a file."""
+    from fivebar_pin.balancing.counterweights import COLOUR
+
+    return bool(np.allclose(visual.rgba, COLOUR, rtol=0.0, atol=1e-6))
 
 
 def safe(name: str) -> str:

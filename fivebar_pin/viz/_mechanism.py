@@ -9,7 +9,16 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
 from fivebar_pin.closures import ClosureKind
-from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, amid_ground, body_names, ground_closures, safe
+from fivebar_pin.viz._drawing import (
+    COLOURS,
+    LINK_COLOURS,
+    Drawing,
+    amid_ground,
+    body_names,
+    ground_closures,
+    is_counterweight,
+    safe,
+)
 from fivebar_pin.viz._geometry import JointShape, body_points, joint_shapes
 from fivebar_pin.viz._record import Recorder, along, pose
 
@@ -25,7 +34,7 @@ _RIBBON_POINTS = 2000
 def draw_mechanism(recorder: Recorder, path: str, drawing: Drawing) -> None:
     """Draw all of one mechanism under a path of the scene, in metres and world axes."""
     shapes = joint_shapes(drawing.chain, _neutral(drawing.chain))
-    drawn = {v.frame for v in drawing.visuals}
+    drawn = {v.frame for v in drawing.visuals if not is_counterweight(v)}
     dressed = {f.parentJoint for f in drawing.chain.model.frames if f.name in drawn}
     for j, body in enumerate(body_names(drawing.chain), start=1):
         node = f"{path}/{body}"
@@ -97,6 +106,9 @@ def _draw_visuals(recorder: Recorder, path: str, drawing: Drawing) -> None:
         node = f"{_node(drawing.chain, path, frame.parentJoint)}/visual {number}"
         recorder.place(node, frame.placement.homogeneous)
         recorder.visual(f"{node}/shape", visual)
+        if is_counterweight(visual):  # a thin arm says whose it is
+            ends = np.array([frame.placement.inverse().translation, visual.placement[:3, 3]])
+            recorder.line(f"{node}/arm", ends, COLOURS["joint"], on_top=True)
 
 
 def _draw_closures(recorder: Recorder, path: str, drawing: Drawing) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
-from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, body_names, ground_closures
+from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, body_names, ground_closures, is_counterweight
 from fivebar_pin.viz._record import Colour, Recorder
 from fivebar_pin.viz._stage import Stage
 
@@ -82,6 +82,7 @@ def _legend(drawings: Sequence[Drawing]) -> list[dict[str, str]]:
     entries = [_entry("block", colour, name) for name, colour in links[:_MOST_LINKS]]
     if len(links) > _MOST_LINKS:
         entries.append(_entry("", COLOURS["joint"], f"and {len(links) - _MOST_LINKS} more links"))
+    entries += _counterweight_entry(drawings)
     if any(d.chain.closures for d in drawings):
         entries.append(_entry("ring", COLOURS["closure"], "loop closure"))
     if any(_stands(d.chain) for d in drawings):
@@ -106,12 +107,24 @@ def _link_entries(drawing: Drawing) -> list[tuple[str, Colour]]:
     model = drawing.chain.model
     entries = []
     for j, name in enumerate(body_names(drawing.chain), start=1):
-        visuals = [v for v in drawing.visuals if find_frame(model, v.frame).parentJoint == j]
+        mine = [v for v in drawing.visuals if find_frame(model, v.frame).parentJoint == j]
+        visuals = [v for v in mine if not is_counterweight(v)]
         if not visuals:
             entries.append((name, LINK_COLOURS[(j - 1) % len(LINK_COLOURS)]))
         coloured = dict.fromkeys((v.frame, v.rgba) for v in visuals if max(v.rgba[:3]) > 0.3)
         entries += list(coloured or dict.fromkeys((v.frame, v.rgba) for v in visuals))
     return entries
+
+
+def _counterweight_entry(drawings: Sequence[Drawing]) -> list[dict[str, str]]:
+    """Return the entry of all counterweights, which share a colour: on which bodies they are; none without any."""
+    weights = [(d.chain, v) for d in drawings for v in d.visuals if is_counterweight(v)]
+    if not weights:
+        return []
+    joints = [(chain, find_frame(chain.model, v.frame).parentJoint) for chain, v in weights]
+    bodies = sorted({body_names(chain)[j - 1] for chain, j in joints if j})
+    named = ", ".join(bodies) if len(bodies) <= _MOST_LINKS else f"{len(bodies)} links"
+    return [_entry("block", weights[0][1].rgba, f"counterweight on {named}")]
 
 
 def _entry(sign: str, colour: Colour, text: str) -> dict[str, str]:
