@@ -78,6 +78,22 @@ def test_ranks_do_not_depend_on_the_masses() -> None:
     )
 
 
+def test_ranks_do_not_depend_on_how_far_the_motors_may_turn() -> None:
+    """Limits of a tenth of a radian leave little room for samples, yet the conditions are the same."""
+    chain = mechanisms.five_bar()
+    q = fb.assembly_modes(chain, [1.5, 0.5])[0]
+    model = chain.model.copy()
+    model.lowerPositionLimit, model.upperPositionLimit = q - 0.05, q + 0.05
+    narrow = fb.ClosedChain(model, chain.closures, chain.actuated)
+    assert [balance_conditions(narrow, kind).rank for kind in ("force", "dynamic")] == [6, 11]
+
+
+def test_too_many_motors_are_suspected_when_nothing_closes() -> None:
+    locked = mechanisms.five_bar().with_actuated(("left", "right", "left_elbow"))
+    with pytest.raises(fb.errors.AssemblyError, match="too many joints are actuated"):
+        balance_conditions(locked, "force")
+
+
 def test_reduced_form_reads_as_the_textbook_equations() -> None:
     """Berkof and Lowen's conditions of the four-bar 0.4, 1.1, 0.9: coefficients are ratios of lengths."""
     equations = balance_conditions(mechanisms.four_bar(), "force").equations

@@ -377,6 +377,13 @@ def test_arguments_of_the_wrong_type_or_shape_are_named(options: dict[str, objec
         balance(chain, "force", **{"motions": path, **options})  # type: ignore[arg-type]
 
 
+def test_a_mechanism_without_mass_is_balanced_as_it_is() -> None:
+    chain = mechanisms.four_bar()
+    nothing = chain.with_inertial_parameters(np.zeros_like(chain.inertial_parameters))
+    design = balance(nothing, "force")
+    assert design.objective == 0.0 and design.residual == 0.0
+
+
 def test_objectives_without_weight_do_not_slow_or_change_a_solve() -> None:
     """A problem prepared for many objectives answers as one prepared for a single one."""
     chain, path = case_I()

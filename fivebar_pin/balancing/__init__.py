@@ -52,8 +52,8 @@ conditions exactly, and refused if a body is outside the physical ones by more t
 The objective of Alici and Shirinzadeh (2004), the sum of squares of bearing forces, torques, shaking moment and angular
 momentum deviation under the force balance equalities, is one such problem (`alici_shirinzadeh`), and so is every
 point of a Pareto front (`pareto`). A finished design is measured by small matrix products, |R (pi, 1)| with a
-triangular R that is computed once for a motion: a million designs take seconds (`score`). `realise` turns added
-parameters into discs, bars or balls.
+triangular R that is computed once for a motion: a million designs take seconds (`score`; `variations` draws some).
+`realise` turns added parameters into discs, bars or balls.
 
 References:
     R. S. Berkof, G. G. Lowen: A new method for completely force balancing simple linkages. J. Eng. Ind. 91 (1969).
@@ -74,6 +74,7 @@ from fivebar_pin.balancing.problem import BalanceProblem, balance_problem
 from fivebar_pin.balancing.regions import Ball, Box, Disc, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
 from fivebar_pin.balancing.scoring import Scores, score
+from fivebar_pin.balancing.variations import variations
 
 __all__ = [
     "MATERIALS",
@@ -102,4 +103,5 @@ __all__ = [
     "realise",
     "regressor",
     "score",
+    "variations",
 ]

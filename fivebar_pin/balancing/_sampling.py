@@ -170,6 +170,7 @@ def _walk(
     """
     limits = _limits(chain, loops)
     actuated, passive = loops.actuated, loops.passive
+    room = 0.5 * float((np.ptp(limits, axis=1) / loops.column_scale[actuated]).min())
     N, sigma, sign = _complement(loops, q)
     kept = [(q[sigma > _REGULAR], N[sigma > _REGULAR])]
     heading = rng.normal(size=(q.shape[0], actuated.size))
@@ -177,6 +178,7 @@ def _walk(
         tangent = np.matmul(N, (heading * loops.column_scale[actuated])[..., None])[..., 0]
         size = np.abs(tangent / loops.column_scale).max(axis=1)
         longest = np.minimum(_STEP, _CAREFUL * sigma) if careful else np.full(q.shape[0], 2.0 * _STEP)
+        longest = np.minimum(longest, room)
         tangent *= (rng.uniform(0.3, 1.0, size.size) * longest / np.maximum(size, 1e-12))[:, None]
         trial = loops.tree.integrate(q, tangent)
         ok = _within(loops, trial, limits)
@@ -221,9 +223,11 @@ def _complement(loops: Loops, q: Array) -> tuple[Array, Array, Array]:
 
 def _too_few(loops: Loops, found: int, wanted: int, residual: float) -> AssemblyError:
     name = loops.closures[0].name if loops.closures else "none"
+    nearest = f" (smallest closure residual {residual:.3g})" if np.isfinite(residual) else ""
     return AssemblyError(
-        f"only {found} of {wanted} random configurations close away from singularities "
-        f"(smallest closure residual {residual:.3g}). Give near=, a closed configuration to start from.",
+        f"only {found} of {wanted} random configurations close away from singularities and within the limits of the "
+        f"actuated joints{nearest}. Give near=, a closed configuration to start from, or ask diagnose(chain) whether "
+        "too many joints are actuated.",
         closure=name,
         residual=residual,
     )

@@ -130,7 +130,7 @@ class Design:
         """Largest residual of the conditions over the moving mass [-]; first moments count at the chain's length."""
         if self.conditions is None or not self.conditions.rank:
             return 0.0
-        return float(np.abs(self.conditions.residual(self.parameters)).max() / self.chain.mass)
+        return float(np.abs(self.conditions.residual(self.parameters)).max() / (self.chain.mass or 1.0))
 
     @property
     def added_mass(self) -> float:

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    from fivebar_pin.cli import balance, check, demo, loads, simulate, view
+    from fivebar_pin.cli import balance, check, demo, loads, score, simulate, view
 
     parser = argparse.ArgumentParser(
         prog="fivebar-pin",
@@ -47,6 +47,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"fivebar-pin {version('fivebar-pin')}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (demo, check, loads, simulate, balance, view):
+    for module in (demo, check, loads, simulate, balance, score, view):
         module.register(commands)
     return parser

@@ -1,0 +1,51 @@
+"""Random mass distributions about a mechanism's own, every one of them physical.
+
+A body's pseudo-inertia P is positive semidefinite, and so is A P A^T for any A. With
+
+    A = [[1 + s R, s L r], [0, 1 + s u]],    R, r, u random in [-1, 1], L the chain's length,
+
+material is stretched, sheared, moved and made heavier or lighter by shares of about s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fivebar_pin._arrays import Array, frozen
+from fivebar_pin.balancing._parameters import from_pseudo_inertia, pseudo_inertia
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InvalidInputError
+
+__all__ = ["variations"]
+
+_BLOCK = 50_000  # designs at a time
+
+
+def variations(chain: ClosedChain, count: int, *, spread: float = 0.2, seed: int = 0) -> Array:
+    """Return random designs for `score`: inertial parameters (count, nb, 10), the chain's own first.
+
+    Args:
+        chain: the mechanism; its bodies must be physical.
+        count: number of designs, at least 1.
+        spread: typical relative change s, between 0 and 0.9 [-].
+        seed: of the draw.
+    """
+    if not isinstance(count, (int, np.integer)) or count < 1:
+        raise InvalidInputError("count", count, "must be an integer of at least 1")
+    if not 0.0 <= spread <= 0.9:
+        raise InvalidInputError("spread", spread, "must lie between 0 and 0.9")
+    if not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InvalidInputError("seed", seed, "must be an integer, not negative")
+    rng = np.random.default_rng(seed)
+    own = np.array(chain.inertial_parameters)
+    P = pseudo_inertia(own)  # (nb, 4, 4)
+    out = np.empty((int(count), *own.shape))
+    for start in range(0, int(count), _BLOCK):
+        part = out[start : start + _BLOCK]
+        A = spread * rng.uniform(-1.0, 1.0, (*part.shape[:2], 4, 4))
+        A[..., 3, :3] = 0.0
+        A[..., :3, 3] *= chain.length
+        A += np.eye(4)
+        part[:] = from_pseudo_inertia(A @ P @ np.swapaxes(A, -1, -2))
+    out[0] = own
+    return frozen(out)
