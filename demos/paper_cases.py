@@ -27,7 +27,7 @@ def report(shown):
     travel = np.linalg.norm(shown.loads.com - shown.loads.com[0], axis=1)
     torque, moment = np.abs(shown.loads.torque).max(axis=0), np.abs(shown.loads.shaking_moment).max()
     print(
-        f"{shown.label:20s} shaking force {force.max():9.3e} N   moment {moment:.4f} N m   "
+        f"{shown.label:24s} shaking force {force.max():9.3e} N   moment {moment:.4f} N m   "
         f"torques {torque[0]:.4f}, {torque[1]:.4f} N m   COM travel {1e3 * travel.max():9.3e} mm"
     )
 
@@ -38,13 +38,15 @@ def main():
     headless = parser.parse_args().headless
     motion = paper.default_motion(samples=201)
     everything = []
-    for case in ("I", "II"):
-        optimum = paper.balance(paper.table_1(case, "balanced"))
-        print(f"case {case}: rho = {np.round(optimum.linkage.rho, 6)}, optimality residual {optimum.kkt_residual:.1e}")
+    for case, reading in (("I", "printed"), ("II", "printed"), ("II", "corrected")):
+        printed = paper.table_1(case, "balanced", reading=reading)
+        optimum = paper.balance(printed)
+        rho, residual = np.round(optimum.linkage.rho, 6), optimum.kkt_residual
+        print(f"case {case}, masses {reading}: rho = {rho}, optimality residual {residual:.1e}")
         for label, linkage in (
             (f"{case} unbalanced", paper.table_1(case, "unbalanced")),
-            (f"{case} as printed", paper.table_1(case, "balanced")),
-            (f"{case} balanced", optimum.linkage),
+            (f"{case} table, {reading}", printed),
+            (f"{case} balanced, {reading}", optimum.linkage),
         ):
             everything.append(moved(linkage, motion, label))
             report(everything[-1])
