@@ -7,9 +7,9 @@ import argparse
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import ladder, mechanisms, roads
+from benchmarks import ladder, mechanisms, roads, scoring
 
-PARTS = ("roads", "mechanisms", "ladder", "assemblies")
+PARTS = ("roads", "mechanisms", "ladder", "assemblies", "scoring")
 
 
 def main() -> None:
@@ -17,6 +17,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, nargs="+", default=[1, 100, 1000, 100000])
     parser.add_argument("--which", nargs="+", choices=PARTS, default=PARTS)
     parser.add_argument("--assemblies", type=int, default=10000, help="random assemblies in all [10000]")
+    parser.add_argument("--designs", type=int, default=1_000_000, help="mass distributions to score [1000000]")
     chosen = parser.parse_args()
     console = Console(width=150)
     if "roads" in chosen.which:
@@ -31,6 +32,10 @@ def main() -> None:
     if "assemblies" in chosen.which:
         rows = mechanisms.assemblies(chosen.assemblies)
         _show(console, "Random assemblies", mechanisms.ASSEMBLIES, rows)
+    if "scoring" in chosen.which:
+        title = "Five-bar designs, RMS of shaking force, shaking moment and torques over 201 samples"
+        _show(console, title, scoring.HEADINGS, scoring.rows(chosen.designs))
+        _show(console, "Force balance of the five-bar solved again", scoring.SOLVES, scoring.solves())
 
 
 def _show(console: Console, title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
