@@ -59,6 +59,19 @@ def test_demo_refuses_a_playing_speed_before_it_writes(tmp_path: Path, capsys: p
     assert not (tmp_path / "out").exists()
 
 
+def test_demo_leaves_no_folder_behind_for_bad_input_and_names_a_file_it_cannot_write(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line each, no traceback."""
+    assert main(["demo", "--out", str(tmp_path / "out"), "--case", "III"]) == 1
+    assert not (tmp_path / "out").exists()
+    (tmp_path / "out" / "results.csv").mkdir(parents=True)
+    capsys.readouterr()
+    assert main(["demo", "--out", str(tmp_path / "out"), "--samples", "11", "--overwrite"]) == 1
+    said = capsys.readouterr().err
+    assert "results.csv: cannot be written" in said and said.count("\n") == 1
+
+
 def test_demo_takes_the_other_reading_of_case_II(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Masses of 0.24 and 0.31 kg, on the other assembly mode and under gravity."""
     words = ["--case", "II", "--reading", "corrected", "--mode", "right", "--gravity", "0", "-9.81", "0"]

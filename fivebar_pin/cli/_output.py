@@ -33,7 +33,10 @@ def write_columns(file: Path, columns: list[tuple[str, Array]]) -> Path:
     """Write named columns as csv, every digit kept."""
     header = ",".join(name for name, _ in columns)
     table = np.column_stack([x for _, x in columns])
-    np.savetxt(file, table, delimiter=",", header=header, comments="", fmt="%.17g")
+    try:
+        np.savetxt(file, table, delimiter=",", header=header, comments="", fmt="%.17g", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(file, f"cannot be written ({error.strerror or error})") from error
     return file
 
 

@@ -74,7 +74,6 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin import paper, viz
 
     number("speed", chosen.speed, positive=True)
-    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite)
     mode = paper.AssemblyMode[chosen.mode.upper()]
     motion = (
         laws.from_file(chosen.motion)
@@ -87,6 +86,7 @@ def run(chosen: argparse.Namespace) -> int:
         _moved(label, linkage, motion, mode, chosen.gravity)
         for label, linkage in (("unbalanced", unbalanced), ("balanced", optimum.linkage))
     ]
+    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite)
     console = _tables.console()
     _print_balance(console, chosen.case, unbalanced, optimum)
     _print_comparison(console, runs)
