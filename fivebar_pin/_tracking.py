@@ -97,7 +97,7 @@ def track(loops: Loops, q0: Array, X: Array, tolerance: float) -> Closed:
     """Follow the branch of q0 along all samples.
 
     Args:
-        q0: closed configuration at X[0] (nq,).
+        q0: closed configuration at X[0] (nq,), at round-off as `assemble` returns it.
         X: actuated coordinates (n, na).
         tolerance: closure residual counted as closed [m or rad, times the chain's length above 1 m].
 
@@ -111,6 +111,9 @@ def track(loops: Loops, q0: Array, X: Array, tolerance: float) -> Closed:
     node = node_at(loops, q0, X[0])
     if node.sigma < SINGULAR:
         raise _located(_singular(node.sigma), 0)
+    if n == 1 and loops.m:
+        gap = np.abs(residual_of(loops, node.q[None])).max(axis=1)
+        return Closed(node.q[None], gap, np.zeros(1), np.array([node.sigma]), node.sign[None])
     path = np.r_[0.0, np.cumsum(np.abs(np.diff(X, axis=0)).max(axis=1))] if X.shape[1] else np.zeros(n)
     index, nodes = [0], [node]
     reach = 0.5 * LONGEST

@@ -245,9 +245,11 @@ def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Arr
         at = _actuated_at(loops, q, x)
         node = node_at(loops, q[0], at)
         if node.sigma >= SINGULAR:
-            q = polish(loops, follow(loops, node, x).q[None]).q
-            _write_actuated(loops, q, x)
-            return np.asarray(q[0])
+            closed = polish(loops, follow(loops, node, x).q[None])
+            if not closed_enough(loops, closed.residual, tolerance)[0]:
+                raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
+            _write_actuated(loops, closed.q, x)
+            return np.asarray(closed.q[0])
     _write_actuated(loops, q, x)
     if not loops.m:
         return np.asarray(q[0])
