@@ -104,3 +104,25 @@ def test_designs_that_cannot_be_scored_are_named() -> None:
         bad[entry] = value
         with pytest.raises(InvalidInputError, match="design 2, body phi_gamma"):
             score(chain, paths, bad)
+
+
+def test_what_stands_still_scores_zero() -> None:
+    """At rest without gravity nothing depends on the masses: no factor is left, and every score is zero."""
+    linkage = paper.table_1("I", "unbalanced")
+    chain, motion = linkage.chain(), paper.default_motion(samples=3)
+    rest = fb.Motion(motion.t[:1], motion.q[:1], 0.0 * motion.v[:1], 0.0 * motion.a[:1])
+    path = fb.drive(chain, rest, near=linkage.configuration(*motion.q[0]))
+    found = score(chain, path, designs(chain, 4), terms=("rms_torque", "peak_shaking_force"))
+    assert len(found) == 4
+    assert not found["rms_torque"].any() and not found["peak_shaking_force"].any()
+
+
+@pytest.mark.parametrize("count", [1, 297, 298, 9000])
+def test_scores_do_not_depend_on_how_the_designs_are_cut_into_pieces(count: int) -> None:
+    chain, paths = five_bar()
+    X = np.repeat(designs(chain, 3), -(-count // 3), axis=0)[:count]
+    together = score(chain, paths, X)
+    for k in {0, count // 2, count - 1}:
+        alone = score(chain, paths, X[k])
+        for term in ("rms_shaking_force", "rms_shaking_moment", "rms_torque"):
+            assert together[term][k] == pytest.approx(alone[term][0], rel=1e-13)

@@ -25,6 +25,7 @@ __all__ = ["Scores", "score"]
 _NOISE = 1e-15  # singular values of a factor below this share of the largest are round-off [-]
 _PEAK_VALUES = 2_000_000  # intermediate values per block when peaks are wanted
 _BLOCK = 8192
+_SINGLE = 200_000  # multiplications in a matrix product that stays on one thread
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,7 +150,7 @@ def _fill(
 ) -> None:
     squares: dict[str, Array] = {}
     if factors.parts:
-        y = x[:, factors.columns] @ factors.W
+        y = _product(x.take(factors.columns, axis=1), factors.W)
         y += factors.w
         squares = {name: np.einsum("kr,kr->k", y[:, s], y[:, s]) for name, s in factors.parts.items()}
     for term, values in out.items():
@@ -161,6 +162,22 @@ def _fill(
         else:
             square = squares[base(term)]
             values[part] = square if term.startswith("mean_square_") else np.sqrt(square)
+
+
+def _product(x: Array, W: Array) -> Array:
+    """Return x @ W in pieces too small for the linear algebra library to spread them over threads.
+
+    Waiting for each other, its threads make products of this shape up to ten times slower.
+    """
+    if not W.size:
+        return np.zeros((len(x), W.shape[1]))
+    rows = max(1, _SINGLE // W.size)
+    whole = len(x) // rows * rows
+    out = np.empty((len(x), W.shape[1]))
+    pieces = out[:whole].reshape(-1, rows, W.shape[1])
+    np.matmul(x[:whole].reshape(-1, rows, W.shape[0]), W, out=pieces)
+    np.matmul(x[whole:], W, out=out[whole:])
+    return out
 
 
 def _peak(rows: Rows, x: Array) -> Array:
