@@ -26,9 +26,10 @@ def number(value: float) -> str:
 
 
 def table(console: Console, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table, first column to the left, the others to the right."""
+    """Print a table, first column to the left, the others to the right; no number is cut on a narrow terminal."""
     from rich import box
     from rich.markup import escape
+    from rich.measure import Measurement
     from rich.table import Table
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_header=any(headings))
@@ -37,7 +38,11 @@ def table(console: Console, title: str, headings: Sequence[str], rows: Sequence[
     for row in rows:
         made.add_row(*(escape(cell) for cell in row))
     console.print(f"\n{title}", markup=False, soft_wrap=True)
-    console.print(made)
+    whole = Measurement.get(console, console.options.update(max_width=10_000), made).maximum
+    usual = console.width
+    console.width = max(usual, whole)
+    console.print(made, crop=False)
+    console.width = usual
 
 
 def peak(x: Array) -> float:

@@ -58,7 +58,7 @@ def run_conditions(chosen: argparse.Namespace) -> int:
     from fivebar_pin.cli._load import load_any
 
     chain = load_any(chosen.path)
-    conditions = balance_conditions(chain, chosen.kind)
+    conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen))
     console = _tables.console()
     console.print(str(conditions), markup=False, soft_wrap=True)
     residual = np.abs(conditions.residual(chain)).max(initial=0.0)
@@ -116,13 +116,32 @@ def run_pareto(chosen: argparse.Namespace) -> int:
 def _common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
     parser.add_argument("--kind", choices=KINDS, default="force", help="what is to vanish [force]")
+    parser.add_argument(
+        "--gravity",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="static balance under gravity in this direction only [any direction]",
+    )
 
 
 def _designing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mode", choices=("add", "redesign"), default="add", help="add material, or redesign [add]")
     parser.add_argument("--bodies", nargs="+", metavar="JOINT", help="bodies that may change, by joint [all]")
     parser.add_argument("--radius", type=float, help="material lies within this distance of each joint [m]")
+    parser.add_argument(
+        "--masses", type=float, nargs=2, metavar=("LOW", "HIGH"), help="bounds on each added mass or new body [kg]"
+    )
+    parser.add_argument("--remove", nargs="+", default=(), metavar="JOINT", help="bodies that may lose material too")
     parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
+
+
+def _direction(chosen: argparse.Namespace) -> Any:
+    if chosen.gravity is None:
+        return "any"
+    if chosen.kind != "static":
+        raise InvalidInputError("--gravity", chosen.gravity, "has a meaning for --kind static only")
+    return chosen.gravity
 
 
 def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, Any]:
@@ -132,7 +151,10 @@ def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, An
         "mode": chosen.mode,
         "bodies": chosen.bodies,
         "region": None if chosen.radius is None else Ball(chosen.radius),
+        "masses": None if chosen.masses is None else tuple(chosen.masses),
+        "remove": chosen.remove,
         "motions": [trajectory],
+        "gravity": _direction(chosen),
     }
 
 
@@ -155,7 +177,11 @@ def _given(option: str, name: str, value: float | None) -> float:
 
 
 def _title(design: Any) -> str:
-    return f"{design.original.name}: {design.kind} balance (weight left out of the force)"
+    return f"{design.original.name}: {_balance(design)} (weight left out of the force)"
+
+
+def _balance(design: Any) -> str:
+    return f"{design.kind} balance" + ("" if design.branch is None else " on the branch of the motion")
 
 
 def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedChain:
@@ -177,12 +203,13 @@ def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedCh
 def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]) -> None:
     changes = [("added", c) for c in design.added] + [("removed", c) for c in design.removed]
     rows = [
-        [word, c.body, f"{c.mass:.6g}", ", ".join(f"{x + 0.0:.5g}" for x in np.round(c.place, 12)), _inertia(c)]
+        [word, c.body, f"{c.mass:.6g}", ", ".join(f"{x + 0.0:.5g}" for x in np.round(c.place, 12)), _inertia(design, c)]
         for word, c in changes
         if c.mass > 1e-7 * design.original.mass
     ]
-    title = f"{design.original.name}: {design.kind} balance, {design.status}; moving mass {design.added_mass:+.6g} kg"
-    _tables.table(console, title, ("", "body of joint", "mass [kg]", "at [m], joint axes", "Izz at its centre"), rows)
+    title = f"{design.original.name}: {_balance(design)}, {design.status}; moving mass {design.added_mass:+.6g} kg"
+    headings = ("", "body of joint", "mass [kg]", "at [m], joint axes", "inertia about it [kg m2]")
+    _tables.table(console, title, headings, rows)
     t = pair[0].trajectory.t
     rows = []
     for name, curves in _curves(design, after, pair).items():
@@ -199,8 +226,12 @@ def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]
     _tables.table(console, "Certificate", ("", ""), rows)
 
 
-def _inertia(change: Any) -> str:
-    return _tables.number(float(change.inertia[2, 2]))
+def _inertia(design: Any, change: Any) -> str:
+    """Write the inertia about the normal of the plane of motion, or the principal ones of a spatial mechanism."""
+    if design.space.planar:
+        normal = design.space.axes[design.space.bodies.index(change.body), 2]
+        return _tables.number(float(normal @ change.inertia @ normal))
+    return ", ".join(f"{x:.3g}" for x in np.linalg.eigvalsh(change.inertia))
 
 
 def _moving(design: Any, after: ClosedChain, trajectory: Trajectory) -> list[Any]:
