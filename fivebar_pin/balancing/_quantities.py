@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing._parameters import plane_axes
-from fivebar_pin.balancing.regressors import _reactions, regressor
+from fivebar_pin.balancing._reaction_rows import reactions
+from fivebar_pin.balancing.regressors import regressor
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.kinematics import drive
@@ -129,7 +130,7 @@ def _bearing_rows(chain: ClosedChain, path: Trajectory, normal: Array | None) ->
         keep = [np.arange(p.offset.shape[1]) % 6 < 3 for p in parts]
         F = np.concatenate([p.matrix[:, k] for p, k in zip(parts, keep, strict=True)], axis=1)
         return F, np.concatenate([p.offset[:, k] for p, k in zip(parts, keep, strict=True)], axis=1)
-    joint, closure = _reactions(chain, path)
+    joint, closure = reactions(chain, path)
     both = np.concatenate([joint, closure], axis=1)[:, :, :3]
     flat = np.matmul(plane_axes(normal)[:2], both).reshape(len(path), -1, both.shape[-1])
     return flat[..., :-1], flat[..., -1]

@@ -23,7 +23,7 @@ from fivebar_pin._arrays import Array, checked, frozen, skew
 from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
-from fivebar_pin.balancing.regressors import State
+from fivebar_pin.balancing._state import State
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
