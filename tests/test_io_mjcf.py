@@ -170,7 +170,11 @@ def test_a_free_joint_and_its_keyframe_come_back(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("<option", "<tendon><spatial/></tendon><option", "tendons are not supported"),
-        ('<connect name="pin"', '<joint joint1="ja" joint2="jb"/><connect name="pin"', "couples the coordinates of joints, not two frames; only connect and weld"),
+        (
+            '<connect name="pin"',
+            '<joint joint1="ja" joint2="jb"/><connect name="pin"',
+            "couples the coordinates of joints, not two frames; only connect and weld",
+        ),
         ("<option", '<include file="other.xml"/><option', "merge them"),
         ('name="jb"', 'name="jb" stiffness="3"', "stiffness is not supported"),
         ('name="jb"', 'name="jb" ref="0.1"', "ref is not supported"),
