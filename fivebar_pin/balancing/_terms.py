@@ -59,7 +59,7 @@ class Term:
         if self.signed:
             G, g = self.vectors[0]
             return float((G @ y + g)[0])
-        return max(float(np.linalg.norm(G @ y + g)) for G, g in self.vectors)
+        return max(float(np.linalg.norm(G @ y + g, axis=1).max()) for G, g in self._stacks())
 
     def epigraph(self, column: int) -> list[Block]:
         """Return the cones of scale * y[column] >= term, for a variable after those of the design."""
@@ -73,28 +73,30 @@ class Term:
         return self._below(np.zeros(n), np.array([limit / self.scale]), f"{self.name} <= {limit:g}")
 
     def _below(self, bound: Array, offset: Array, label: str) -> list[Block]:
+        """Return the cones of term / scale <= bound @ y + offset."""
         blocks, flat = [], []
-        for G, g in self.vectors:
-            G, g = np.pad(G / self.scale, ((0, 0), (0, bound.size - G.shape[1]))), g / self.scale
-            if self.signed:
-                flat.append((bound - G[0], offset - g))
-            elif G.shape[0] == 1:
-                flat += [(bound - G[0], offset - g), (bound + G[0], offset + g)]
-            else:
-                blocks.append(
-                    Block(label, "soc", np.vstack([bound, G]), np.concatenate([offset, g]), first(G.shape[0] + 1))
-                )
+        for G, g in self._stacks():
+            k, d, n = G.shape
+            rows = np.zeros((k, d + 1, bound.size))
+            rows[:, 0], rows[:, 1:, :n] = bound, G / self.scale
+            right = np.concatenate([np.broadcast_to(offset, (k, 1)), g / self.scale], axis=1)
+            if d > 1:
+                inward = first(d + 1)
+                blocks += [Block(label, "soc", rows[i], right[i], inward) for i in range(k)]
+                continue
+            flat.append((rows[:, 0] - rows[:, 1], right[:, 0] - right[:, 1]))
+            if not self.signed:
+                flat.append((rows[:, 0] + rows[:, 1], right[:, 0] + right[:, 1]))
         if flat:
-            blocks.append(
-                Block(
-                    label,
-                    "nonneg",
-                    np.stack([r for r, _ in flat]),
-                    np.concatenate([c for _, c in flat]),
-                    np.ones(len(flat)),
-                )
-            )
+            right = np.concatenate([c for _, c in flat])
+            blocks.append(Block(label, "nonneg", np.concatenate([r for r, _ in flat]), right, np.ones(right.size)))
         return blocks
+
+    def _stacks(self) -> list[tuple[Array, Array]]:
+        """Return the vectors of each length together: G (k, d, n), g (k, d)."""
+        lengths = sorted({len(g) for _, g in self.vectors})
+        together = [[(G, g) for G, g in self.vectors if len(g) == d] for d in lengths]
+        return [(np.stack([G for G, _ in group]), np.stack([g for _, g in group])) for group in together]
 
 
 def first(size: int) -> Array:
