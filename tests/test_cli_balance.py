@@ -44,3 +44,14 @@ def test_mass_bounds_and_removal_reach_the_library(capsys: pytest.CaptureFixture
     assert "removed" in said and "…" not in said
     assert main([*words, "--masses", "0", "0.01"]) == 1
     assert "<= 0.01 kg" in capsys.readouterr().out
+
+
+def test_pareto_traces_the_front_of_one_branch(capsys: pytest.CaptureFixture[str]) -> None:
+    """Dynamic balance of the antiparallelogram: no front over all assembly modes, one on the branch of the motion."""
+    words = ["pareto", "four_bar_antiparallelogram", "added_mass", "rms_torque", "--kind", "dynamic", "--points", "3"]
+    assert main(words) == 1
+    assert main([*words, "--branch", "motion"]) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    front = np.array([[float(x) for x in row] for row in rows if len(row) == 2 and row[0][:1].isdigit()])
+    assert front.shape == (3, 2)
+    assert np.all(np.diff(front[:, 0]) > 0.0) and np.all(np.diff(front[:, 1]) < 0.0)

@@ -134,6 +134,12 @@ def _designing(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--remove", nargs="+", default=(), metavar="JOINT", help="bodies that may lose material too")
     parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
+    parser.add_argument(
+        "--branch",
+        choices=("all", "motion"),
+        default="all",
+        help="assembly modes: all, or the motion's [all]",
+    )
 
 
 def _direction(chosen: argparse.Namespace) -> Any:
@@ -155,6 +161,7 @@ def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, An
         "remove": chosen.remove,
         "motions": [trajectory],
         "gravity": _direction(chosen),
+        "near": trajectory.q[0] if chosen.branch == "motion" else None,
     }
 
 
