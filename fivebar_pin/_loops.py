@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +11,7 @@ import pinocchio as pin
 
 from fivebar_pin import closures as rows
 from fivebar_pin._arrays import Array
+from fivebar_pin._once import once_per_chain
 from fivebar_pin._tree import Poses, Rates, Tree
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.closures import Closure, FramePair
@@ -150,6 +150,18 @@ class Loops:
         """Number of rows that are independent in general."""
         return int(self.reduce.shape[0])
 
+    def actuated_of(self, q: Array) -> Array:
+        """Return the actuated coordinates of configurations q (n, nq) -> (n, na)."""
+        x = np.empty((q.shape[0], self.actuated.size))
+        for column, k in enumerate(self.actuated):
+            x[:, column] = self.tree.coordinate(q, int(k))
+        return x
+
+    def set_actuated(self, q: Array, x: Array) -> None:
+        """Write actuated coordinates x, (na,) for all or (n, na), into configurations q (n, nq), in place."""
+        for column, k in enumerate(self.actuated):
+            self.tree.set_coordinate(q, int(k), np.broadcast_to(x[..., column], q.shape[:1]))
+
     def pairs(self, poses: Poses) -> list[FramePair]:
         """Return the world poses of the frames of every closure."""
         out = []
@@ -184,10 +196,7 @@ class Loops:
             start = 0
             for c in (self.anchored[k] for k in g.members):
                 m = c.closure.kind.rows
-                at = np.searchsorted(g.columns, c.moved)
-                block[:, start : start + m, at] = np.matmul(
-                    rows.selector(c.closure, pairs[c.index]), poses.S[:, :, c.moved] * c.sign[c.moved]
-                )
+                block[:, start : start + m, np.searchsorted(g.columns, c.moved)] = _rows(c, poses, pairs)
                 start += m
             out.append(block)
         return out
@@ -296,7 +305,7 @@ class Loops:
         start = 0
         for c in closures:
             m = c.closure.kind.rows
-            J[:, start : start + m] = np.matmul(rows.selector(c.closure, pairs[c.index]), poses.S * c.sign)
+            J[:, start : start + m, c.moved] = _rows(c, poses, pairs)
             start += m
         scale = self.row_scale[rows_]
         wide = np.concatenate(list(J * scale[:, None] * self.column_scale), axis=1)
@@ -311,15 +320,15 @@ class Loops:
         return self.tree.poses(self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent))
 
 
-_CACHE: weakref.WeakKeyDictionary[ClosedChain, Loops] = weakref.WeakKeyDictionary()
-
-
+@once_per_chain
 def loops_of(chain: ClosedChain) -> Loops:
     """Return the prepared closures of a chain, made once."""
-    found = _CACHE.get(chain)
-    if found is None:
-        found = _CACHE[chain] = Loops(chain)
-    return found
+    return Loops(chain)
+
+
+def _rows(c: _Anchored, poses: Poses, pairs: list[FramePair]) -> Array:
+    """Return the Jacobian of one closure in the columns that move it (n, rows, moved)."""
+    return np.asarray(np.matmul(rows.selector(c.closure, pairs[c.index]), poses.S[:, :, c.moved] * c.sign[c.moved]))
 
 
 def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:

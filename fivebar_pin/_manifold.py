@@ -12,7 +12,6 @@ Unlike the choice of single joints, no chart fails where the mechanism itself is
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +19,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of, open_message
+from fivebar_pin._once import once_per_chain
 from fivebar_pin._tree import Poses
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import FramePair
@@ -204,12 +204,7 @@ class Manifold:
         return best
 
 
-_CACHE: weakref.WeakKeyDictionary[ClosedChain, Manifold] = weakref.WeakKeyDictionary()
-
-
+@once_per_chain
 def manifold_of(chain: ClosedChain) -> Manifold:
     """Return the prepared manifold of a chain, made once."""
-    found = _CACHE.get(chain)
-    if found is None:
-        found = _CACHE[chain] = Manifold(chain)
-    return found
+    return Manifold(chain)

@@ -150,7 +150,7 @@ def _try(loops: Loops, node: _Node, x: Array) -> _Node | None:
     if not size <= LONGEST:
         return None
     q = loops.tree.integrate(node.q[None], tangent[None])
-    _set_actuated(loops, q, x[None])
+    loops.set_actuated(q, x)
     correction, least = 0.0, max(SINGULAR, _DROP * node.sigma)
     for _ in range(_CORRECTIONS):
         here = _correct(loops, q)
@@ -184,7 +184,7 @@ def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, toleran
         trusted &= _on_the_side_of(loops, nodes, np.searchsorted(index, np.arange(n), side="right") - 1, closed.q)
     if trusted.all():
         return closed
-    return _mend(loops, index, nodes, X, closed, trusted, tolerance) if n else closed
+    return _mend(loops, index, nodes, X, closed, trusted, tolerance)
 
 
 def _on_the_side_of(loops: Loops, nodes: list[_Node], which: np.ndarray, q: Array) -> np.ndarray:
@@ -242,13 +242,8 @@ def _between(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array) -> A
         s * s * (3.0 - 2.0 * s) * span + s * (1.0 - s) ** 2 * m0 - s * s * (1.0 - s) * m1 + across
     )
     guess = loops.tree.integrate(Q[b], tangent)
-    _set_actuated(loops, guess, X)
+    loops.set_actuated(guess, X)
     return guess
-
-
-def _set_actuated(loops: Loops, q: Array, x: Array) -> None:
-    for column, k in enumerate(loops.actuated):
-        loops.tree.set_coordinate(q, int(k), x[:, column])
 
 
 def _apart(loops: Loops, q0: Array, q1: Array) -> bool:
@@ -259,7 +254,7 @@ def _apart(loops: Loops, q0: Array, q1: Array) -> bool:
 def _blocked(loops: Loops, node: _Node, x: Array) -> AssemblyError | SingularityError:
     """Say why there is no way from a node to x: x is out of reach, or a singularity lies in between."""
     q = np.array(node.q[None])
-    _set_actuated(loops, q, x[None])
+    loops.set_actuated(q, x)
     found = search(loops, q)
     residual = residual_of(loops, found)[0]
     if np.abs(residual).max(initial=0.0) > 1e-8 * max(1.0, loops.length):

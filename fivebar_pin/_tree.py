@@ -13,13 +13,9 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, cross
-
-Index = npt.NDArray[np.intp]
-
 
 _FEW = 6  # up to here one Pinocchio call per sample beats the batch
 

@@ -12,7 +12,6 @@ The wrench on the frame comes out of the same recursion when the tree hangs on a
 from __future__ import annotations
 
 import os
-import weakref
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -24,10 +23,11 @@ import pinocchio as pin
 from fivebar_pin import _bodies
 from fivebar_pin._arrays import Array, checked, cross, frozen, numeric
 from fivebar_pin._loops import loops_of
+from fivebar_pin._once import once_per_chain
 from fivebar_pin._reactions import Reactions, reactions
 from fivebar_pin._springs import JointSpring, Spring, SpringForces, checked_springs, spring_forces
 from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Loads", "inverse_dynamics"]
@@ -183,12 +183,7 @@ def inverse_dynamics(
         SolverError: a spring whose ends meet has a force of no direction.
     """
     n = len(trajectory)
-    if trajectory.q.shape != (n, chain.nq) or trajectory.N.shape != (n, chain.nv, chain.na):
-        raise InvalidInputError(
-            "trajectory",
-            f"q {trajectory.q.shape}, N {trajectory.N.shape}",
-            f"must belong to this chain: q ({n}, {chain.nq}), N ({n}, {chain.nv}, {chain.na})",
-        )
+    trajectory.require_of(chain)
     point = checked("about", about, (3,))
     wrench, tree_torque = _hanging(chain).evaluate(trajectory.q, trajectory.v, trajectory.a)
     tree_torque += friction_torque(chain, trajectory.v)
@@ -254,14 +249,9 @@ class _Hanging:
         return out[:6].T, np.array(out[6:].T)
 
 
-_HANGING: weakref.WeakKeyDictionary[ClosedChain, _Hanging] = weakref.WeakKeyDictionary()
-
-
+@once_per_chain
 def _hanging(chain: ClosedChain) -> _Hanging:
-    found = _HANGING.get(chain)
-    if found is None:
-        found = _HANGING[chain] = _Hanging(chain)
-    return found
+    return _Hanging(chain)
 
 
 def _external(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] | None, n: int) -> dict[str, Array]:

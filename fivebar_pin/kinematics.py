@@ -248,9 +248,9 @@ def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Arr
             closed = polish(loops, follow(loops, node, x).q[None])
             if not closed_enough(loops, closed.residual, tolerance)[0]:
                 raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
-            _write_actuated(loops, closed.q, x)
+            loops.set_actuated(closed.q, x)
             return np.asarray(closed.q[0])
-    _write_actuated(loops, q, x)
+    loops.set_actuated(q, x)
     if not loops.m:
         return np.asarray(q[0])
     for starts in (q, _nudged(loops, q, x)):  # a search that starts at a saddle stays there: step aside
@@ -269,13 +269,13 @@ def _nudged(loops: Loops, q: Array, x: Array) -> Array:
     rng = np.random.default_rng(0)
     tangent = _NUDGE * rng.uniform(-1.0, 1.0, (_NUDGES, loops.tree.nv)) * loops.column_scale
     starts = loops.tree.integrate(np.repeat(q, _NUDGES, axis=0), tangent)
-    _write_actuated(loops, starts, x)
+    loops.set_actuated(starts, x)
     return starts
 
 
 def _actuated_at(loops: Loops, q: Array, x: Array) -> Array:
     """Return the actuated coordinates (na,) of q (1, nq); unbounded joints count from the turn nearest to x."""
-    at = np.array([loops.tree.coordinate(q, int(k))[0] for k in loops.actuated])
+    at = loops.actuated_of(q)[0]
     turn = 2.0 * np.pi * np.array([loops.tree.is_cyclic(int(k)) for k in loops.actuated], dtype=np.float64)
     return np.asarray(at + turn * np.round((x - at) / (2.0 * np.pi)))
 
@@ -290,7 +290,7 @@ def _closed_from_starts(
     tangent = rng.uniform(-np.pi, np.pi, (starts, loops.tree.nv)) * loops.column_scale
     tangent[0] = 0.0
     q = loops.tree.integrate(np.repeat(pin.neutral(chain.model)[None], starts, axis=0), tangent)
-    _write_actuated(loops, q, x)
+    loops.set_actuated(q, x)
     if not loops.m:
         return q[:1], np.zeros(0)
     found = search(loops, q)
@@ -315,11 +315,6 @@ def _same_pose(loops: Loops, poses: object, other: Array) -> bool:
     return all(np.abs(r - s).max() < near for r, s in zip(poses.R, b.R, strict=True)) and all(
         np.abs(r - s).max() < near * loops.length for r, s in zip(poses.p, b.p, strict=True)
     )
-
-
-def _write_actuated(loops: Loops, q: Array, x: Array) -> None:
-    for column, k in enumerate(loops.actuated):
-        loops.tree.set_coordinate(q, int(k), np.full(q.shape[0], x[column]))
 
 
 def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:

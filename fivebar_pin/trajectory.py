@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, frozen
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import InvalidInputError
 
 __all__ = ["Trajectory"]
 
@@ -39,6 +41,20 @@ class Trajectory:
 
     def __len__(self) -> int:
         return int(self.t.size)
+
+    def require_of(self, chain: ClosedChain) -> None:
+        """Raise unless this trajectory can belong to the chain.
+
+        Raises:
+            InvalidInputError: another number of coordinates or motors.
+        """
+        n = len(self)
+        if self.q.shape != (n, chain.nq) or self.N.shape != (n, chain.nv, chain.na):
+            raise InvalidInputError(
+                "trajectory",
+                f"q {self.q.shape}, N {self.N.shape}",
+                f"must belong to this chain: q ({n}, {chain.nq}), N ({n}, {chain.nv}, {chain.na})",
+            )
 
     @property
     def worst_closure(self) -> float:

@@ -82,13 +82,7 @@ def regressor(
     """
     if quantity not in _BUILDERS:
         raise UnknownNameError("quantity", quantity, QUANTITIES)
-    n = len(trajectory)
-    if trajectory.q.shape != (n, chain.nq) or trajectory.N.shape != (n, chain.nv, chain.na):
-        raise InvalidInputError(
-            "trajectory",
-            f"q {trajectory.q.shape}, N {trajectory.N.shape}",
-            f"must belong to this chain: q ({n}, {chain.nq}), N ({n}, {chain.nv}, {chain.na})",
-        )
+    trajectory.require_of(chain)
     matrix, offset = _BUILDERS[quantity](chain, trajectory, checked("about", about, (3,)))
     return Regressor(quantity, frozen(matrix), frozen(offset))
 

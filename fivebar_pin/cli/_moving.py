@@ -21,9 +21,9 @@ def moved(chain: ClosedChain, file: str | None) -> Trajectory:
     swaying = sway(chain, q0)
     if swaying is not None:
         return swaying
-    at = [loops_of(chain).tree.coordinate(q0[None], int(k))[0] for k in chain.actuated_index]
+    at = loops_of(chain).actuated_of(q0[None])
     rest = np.zeros((1, chain.na))
-    return drive(chain, laws.Motion(np.zeros(1), np.array(at)[None], rest, rest), near=q0, limits="ignore")
+    return drive(chain, laws.Motion(np.zeros(1), at, rest, rest), near=q0, limits="ignore")
 
 
 def standing(chain: ClosedChain) -> Array:
@@ -32,9 +32,8 @@ def standing(chain: ClosedChain) -> Array:
 
     loops = loops_of(chain)
     for q in [*chain.references.values(), pin.neutral(chain.model)]:
-        at = np.array([loops.tree.coordinate(q[None], int(k))[0] for k in chain.actuated_index])
         try:
-            return assemble(chain, at, q)
+            return assemble(chain, loops.actuated_of(q[None])[0], q)
         except (AssemblyError, SingularityError):
             continue
     rng = np.random.default_rng(0)
@@ -52,7 +51,7 @@ def sway(chain: ClosedChain, q0: Array, *, samples: int = 121, period: float = 2
         return None
     loops = loops_of(chain)
     t = np.linspace(0.0, period, samples)
-    at = [float(loops.tree.coordinate(q0[None], int(k))[0]) for k in chain.actuated_index]
+    at = loops.actuated_of(q0[None])[0].tolist()
     scale = loops.column_scale[chain.actuated_index]
     for amplitude in (0.8, 0.5, 0.3, 0.15, 0.05):
         swings = [

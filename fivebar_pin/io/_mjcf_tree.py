@@ -50,9 +50,9 @@ class BodyTree:
         """Walk <worldbody>; recursion is bounded by the depth that the XML reader admits."""
         if worldbody.attrib.get("name", WORLD) != WORLD:
             raise self.reader.fail("<worldbody>", "is always called world")
-        self.contents(worldbody, WORLD, WORLD, worldbody.get("childclass"), WORLD)
+        self.contents(worldbody, WORLD, WORLD, worldbody.get("childclass"))
 
-    def contents(self, body: ElementTree.Element, link: str, where: str, childclass: str | None, carrier: str) -> None:
+    def contents(self, body: ElementTree.Element, link: str, where: str, childclass: str | None) -> None:
         visuals: list[Visual] = []
         for child in body:
             if child.tag == "body":
@@ -89,7 +89,7 @@ class BodyTree:
         self.bodies[name] = link = self.new_link(name)
         self.chain_of_joints(joints, parent, link, pose, where)
         self.links[link] = LinkEntry(link, inertia)
-        self.contents(body, link, where, childclass, name)
+        self.contents(body, link, where, childclass)
 
     def chain_of_joints(
         self, joints: list[ElementTree.Element], parent: str, link: str, pose: Array, where: str
