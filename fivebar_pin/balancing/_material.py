@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._conic import Block, svec
 from fivebar_pin.balancing._parameters import _PAIRS
 from fivebar_pin.balancing.regions import Shape, Solid
+from fivebar_pin.balancing.solvers import Block, svec
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._conic import Block
 from fivebar_pin.balancing._quantities import Rows, reflected_inertia
 from fivebar_pin.balancing._setup import Setup
 from fivebar_pin.balancing._terms import (
@@ -24,6 +23,7 @@ from fivebar_pin.balancing._terms import (
     rows_term,
     torque_limits,
 )
+from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory

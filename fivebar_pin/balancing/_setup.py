@@ -9,11 +9,11 @@ import numpy as np
 
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin.balancing import _lift
-from fivebar_pin.balancing._conic import Block
 from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing.conditions import BalanceConditions
 from fivebar_pin.balancing.regions import Ball, Disc, Region, resolve
+from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 

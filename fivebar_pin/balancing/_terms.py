@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._conic import Block
 from fivebar_pin.balancing._quantities import MEASURES, Rows
+from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 LINEAR = ("added_mass", "inertia")

@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._conic import Certificate
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import Rows
 from fivebar_pin.balancing.conditions import BalanceConditions
+from fivebar_pin.balancing.solvers import Certificate
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InfeasibleError
 

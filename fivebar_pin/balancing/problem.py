@@ -21,7 +21,6 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
 from fivebar_pin.balancing import _lift
-from fivebar_pin.balancing._conic import Block, Certificate, Outcome, Program
 from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing._objective import TermMaker, weights_of
 from fivebar_pin.balancing._parameters import Space
@@ -32,6 +31,7 @@ from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, po
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.regions import Disc, Region
+from fivebar_pin.balancing.solvers import Block, Certificate, Outcome, Program, solve
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError, UnknownNameError
 
@@ -111,9 +111,9 @@ class BalanceProblem:
         program = Program(P.size, [*bounds, *self.caps, *epigraphs])
         problem = ""
         for margin in _MARGINS:
-            outcome = program.solve(P, q, margin=margin)
+            outcome = solve(program, P, q, margin=margin)
             if outcome.x is None:
-                outcome = program.solve(P, q)
+                outcome = solve(program, P, q)
                 if outcome.x is None:
                     return self._infeasible(self._proof(bounds) or outcome.certificate)
             design, problem = self._finish(outcome, program, weights, (P, unit))
@@ -127,7 +127,7 @@ class BalanceProblem:
     def _proof(self, bounds: Sequence[Block]) -> Certificate | None:
         """Return a proof that does without the caps on masses, which says more, if there is one."""
         try:
-            return Program(self.n, bounds).solve(np.zeros(self.n), np.zeros(self.n)).certificate
+            return solve(Program(self.n, bounds), np.zeros(self.n), np.zeros(self.n)).certificate
         except SolverError:
             return None
 
