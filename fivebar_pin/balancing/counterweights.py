@@ -158,9 +158,10 @@ class Realisation:
         d = self.design
         if not self.attained:
             return "the pieces do not have what the design asks for: take the realised figures"
+        kind = "of this kind and with these arms" if d.arms else "of this kind"
         if d.status == "optimal":
-            return f"optimal: no counterweights of this kind are better than {d.dual_bound:.9g}"
-        return f"not proved optimal: objective {d.objective:.9g}, none of this kind is better than {d.dual_bound:.9g}"
+            return f"optimal: no counterweights {kind} are better than {d.dual_bound:.9g}"
+        return f"not proved optimal: objective {d.objective:.9g}, none {kind} is better than {d.dual_bound:.9g}"
 
     def _measured(self, name: str) -> float:
         d, pi = self.design, self.parameters
