@@ -20,7 +20,7 @@ def once_per_chain(make: Callable[[ClosedChain], T]) -> Callable[[ClosedChain], 
     def remembered(chain: ClosedChain) -> T:
         found = made.get(chain)
         if found is None:
-            found = made[chain] = make(chain)
+            found = made.setdefault(chain, make(chain))  # one and the same for threads that ask at once
         return found
 
     return remembered

@@ -1,8 +1,11 @@
-"""Random samples of the closed configurations of a chain, and whether it moves in a plane."""
+"""Samples of the closed configurations of a chain, drawn once, and whether it moves in a plane."""
 
 from __future__ import annotations
 
+from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Literal
 
 import numpy as np
@@ -11,25 +14,38 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, checked, frozen
 from fivebar_pin._loops import Loops, loops_of
-from fivebar_pin._newton import closed_enough, polish, residual_of, search
+from fivebar_pin._newton import Limits, polish, residual_of, search
+from fivebar_pin._once import once_per_chain
 from fivebar_pin._tree import Poses
 from fivebar_pin.balancing._parameters import Space, plane_axes
+from fivebar_pin.balancing._walk import REGULAR, Ground, Walk, ground
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 
 SpaceName = Literal["auto", "planar", "spatial"]
 
-_SEEDS = 48
-_STEP = 0.35  # of a random walk [rad, or chain lengths]
-_CAREFUL = 0.2  # step of a careful walk over the smallest singular value [rad, or chain lengths]
-_LONG = 40  # half the steps of a careful walk
-_REGULAR = 1e-3  # scaled smallest singular value of a sample worth keeping [-]
-_WIDE = 50.0  # joint limits beyond this [rad, or chain lengths] do not bound the samples
+_STARTS = 96  # random configurations at a time that a search for closed ones starts from
+_TRIES = 12  # times so many, while nothing closes
+_SEARCH = 60  # steps of a search
+_MANY = 16  # places that walkers set out from that are many
+_WALKERS = 48  # walkers at least, several from one place when these are few
+_ROUND, _LONG = 4, 80  # steps of a round, when they set out from many places and when from few
+_ROUNDS = 24  # rounds before too few samples are an error
+_KEPT = 1024  # samples kept of a round
+_ENDLESS = 1e3  # joint limits beyond this [rad, or chain lengths] are none
+_AT_LIMIT = 1e-9  # how far beyond a limit a configuration still lies on it [rad or m]
+_SHELF = 8  # draws remembered for one chain
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Closed, regular configurations: q (n, nq), complement N (n, nv, na), poses of the joints."""
+    """Closed, regular configurations.
+
+    Attributes:
+        q: configurations (n, nq).
+        N: at each a basis of the velocities that keep the loops closed (n, nv, na), orthonormal when scaled.
+        poses: of the joints.
+    """
 
     q: Array
     N: Array
@@ -39,18 +55,26 @@ class Samples:
         return int(self.q.shape[0])
 
 
-def random_samples(chain: ClosedChain, count: int, *, near: npt.ArrayLike | None = None, seed: int = 0) -> Samples:
-    """Draw closed configurations: random starts, each followed by a random walk on its assembly mode.
+def random_samples(
+    chain: ClosedChain, count: int, *, near: npt.ArrayLike | None = None, seed: int = 0, skip: int = 0
+) -> Samples:
+    """Return closed configurations met on random walks over all that the mechanism can take.
+
+    Walkers set out from the model's reference configurations, the neutral one and random ones, closed in all
+    coordinates. They keep the limits of the actuated joints; those of passive joints play no part. What was drawn for
+    a chain, `near` and seed is remembered and goes on where it stopped: more samples begin with the same ones.
 
     Args:
         chain: the mechanism.
-        count: how many at least.
+        count: how many.
         near: closed configuration (nq,); when given, only configurations that can be reached from it without
-            passing a singularity are drawn, else all assembly modes that the random starts lead to.
+            passing a singularity are drawn, else all assembly modes that the starts lead to.
         seed: of the draw.
+        skip: how many of the first to leave out.
 
     Raises:
         AssemblyError: too few configurations close, or `near` is not closed.
+        InvalidInputError: nothing is actuated, the motion is left undetermined, or `near` is beyond a limit.
     """
     loops = loops_of(chain)
     loops.require_determined()
@@ -58,20 +82,9 @@ def random_samples(chain: ClosedChain, count: int, *, near: npt.ArrayLike | None
         raise InvalidInputError("actuated joints", [], "must be at least one, else nothing moves")
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise InvalidInputError("seed", seed, "must be an integer, not negative")
-    rng = np.random.default_rng(seed)
-    if near is None:
-        q, good = _starts(chain, loops, rng)
-        walks = max(2, -(-count // max(1, q.shape[0])))
-        if not q.shape[0]:
-            raise _too_few(loops, 0, count, good)
-    else:
-        q = _near(chain, loops, near)
-        walks = _LONG + -(-count // _SEEDS)
-    out, N = _walk(chain, loops, q, rng, 2 * walks, careful=near is not None)
-    if out.shape[0] < count:
-        raise _too_few(loops, out.shape[0], count, float("nan"))
-    pick = rng.permutation(out.shape[0])[: 2 * count]
-    q, N = out[pick], N[pick]
+    at = None if near is None else checked("near", near, (chain.nq,))
+    q, N = _shelf_of(chain).first(chain, at, int(seed), count)
+    q, N = q[skip:], N[skip:]
     return Samples(q, N, loops.tree.poses(q))
 
 
@@ -112,122 +125,171 @@ def _normal(S: Array, length: float, tolerance: float = 1e-9) -> Array | None:
     return np.asarray(snapped / np.linalg.norm(snapped))
 
 
-def _starts(chain: ClosedChain, loops: Loops, rng: np.random.Generator) -> tuple[Array, float]:
-    """Return closed configurations from random starts (k, nq), and the smallest residual seen."""
-    n = 3 * _SEEDS
-    tangent = rng.uniform(-np.pi, np.pi, (n, loops.tree.nv)) * loops.column_scale
-    q = loops.tree.integrate(np.repeat(pin.neutral(chain.model)[None], n, axis=0), tangent)
-    for k, (low, high) in zip(loops.actuated, _limits(chain, loops), strict=True):
-        if high - low < 2.0 * _WIDE * loops.column_scale[k]:
-            loops.tree.set_coordinate(q, int(k), rng.uniform(low, high, n))
-    if not loops.m:
-        return q, 0.0
-    closed = polish(loops, search(loops, q))
-    good = closed_enough(loops, closed.residual, 1e-12) & ~loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
-    good &= closed.sigma > _REGULAR
-    return closed.q[good], float(closed.residual.min())
+class _Shelf:
+    """The draws of one chain: made once, then continued, the oldest given up; one thread at a time."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._draws: OrderedDict[tuple[bytes, int], _Draw] = OrderedDict()
+
+    def first(self, chain: ClosedChain, near: Array | None, seed: int, count: int) -> tuple[Array, Array]:
+        """Return q and N of the first samples of a draw."""
+        key = (b"" if near is None else near.tobytes(), seed)
+        with self._lock:
+            draw = self._draws.pop(key, None) or _Draw(chain, near, seed)
+            self._draws[key] = draw
+            if len(self._draws) > _SHELF:
+                self._draws.popitem(last=False)
+            return draw.first(count)
 
 
-def _limits(chain: ClosedChain, loops: Loops) -> Array:
-    """Return the limits of the actuated coordinates (na, 2)."""
-    model = chain.model
-    out = np.full((chain.na, 2), [-np.inf, np.inf])
-    for i, name in enumerate(chain.actuated):
+@once_per_chain
+def _shelf_of(chain: ClosedChain) -> _Shelf:
+    return _Shelf()
+
+
+class _Draw:
+    """The samples of one chain, place and seed that were asked for so far. It holds no chain, so that it can be kept."""
+
+    def __init__(self, chain: ClosedChain, near: Array | None, seed: int) -> None:
+        self._loops = loops_of(chain)
+        self._rng = np.random.default_rng(seed)
+        self._limits = _limits(chain, self._loops)
+        self._near = near is not None
+        self._tried = self._walked = 0
+        self._open: tuple[str, float] = ("none", float("nan"))
+        if near is None:
+            places = self._places([pin.neutral(chain.model), *chain.references.values()])
+        else:
+            places = self._place(chain, near)
+        self._closed = n = places.q.shape[0]
+        walkers = places.of(np.resize(np.arange(n), max(_WALKERS, n)) if n else np.arange(0))
+        self._steps = _ROUND if n >= _MANY else _LONG
+        self._walk = Walk(self._loops, self._limits, walkers, self._rng, careful=self._near)
+        self._q, self._N = self._mixed([places])
+
+    def first(self, count: int) -> tuple[Array, Array]:
+        """Return q (count, nq) and N (count, nv, na); walk on where fewer were drawn so far.
+
+        Raises:
+            AssemblyError: the walks lead to fewer.
+        """
+        rounds = _ROUNDS if self._closed else 0
+        while self._q.shape[0] < count and rounds:
+            q, N = self._mixed([self._walk.step() for _ in range(self._steps)])
+            self._q, self._N = np.concatenate([self._q, q]), np.concatenate([self._N, N])
+            self._walked += self._steps
+            rounds -= 1
+        if self._q.shape[0] < count:
+            raise self._too_few(count)
+        return self._q[:count], self._N[:count]
+
+    def _mixed(self, stops: Sequence[Ground]) -> tuple[Array, Array]:
+        """Return q and N of some of the stops that are fit for samples, in random order."""
+        fit = [stop.control > REGULAR for stop in stops]
+        q = np.concatenate([stop.q[ok] for stop, ok in zip(stops, fit, strict=True)])
+        T = np.concatenate([stop.T[ok] for stop, ok in zip(stops, fit, strict=True)])
+        pick = self._rng.permutation(q.shape[0])[:_KEPT]
+        return q[pick], T[pick] * self._loops.column_scale[:, None]
+
+    def _places(self, named: Sequence[Array]) -> Ground:
+        """Return closed, regular configurations that a search leads to from named and random ones."""
+        loops = self._loops
+        starts = np.concatenate([np.stack(named), self._random(named[0], named[-1])])
+        for _ in range(_TRIES):
+            self._limits.clamp(loops, starts)
+            q = starts
+            if loops.m:
+                q = search(loops, starts, columns=np.arange(loops.tree.nv), limits=self._limits, iterations=_SEARCH)
+                q = polish(loops, q).q
+                self._note(q)
+            here = ground(loops, q)
+            good = here.regular() & (here.control > REGULAR) & self._limits.inside(loops, q)
+            if loops.m:
+                good &= ~loops.opposed(loops.pairs(loops.tree.poses(q)))
+            self._tried += starts.shape[0]
+            if good.any():
+                break
+            starts = self._random(named[0], named[-1])
+        return here.of(np.flatnonzero(good))
+
+    def _note(self, q: Array) -> None:
+        """Remember what stays open the least, as evidence."""
+        residual = residual_of(self._loops, q)
+        name, size = self._loops.worst(residual[int(np.argmin(np.abs(residual).max(axis=1)))])
+        if not size >= self._open[1]:
+            self._open = name, size
+
+    def _random(self, neutral: Array, middle: Array) -> Array:
+        """Return random configurations (n, nq), limited coordinates within their limits, about a middle one."""
+        loops, limits = self._loops, self._limits
+        tangent = self._rng.uniform(-np.pi, np.pi, (_STARTS, loops.tree.nv)) * loops.column_scale
+        q = loops.tree.integrate(np.repeat(neutral[None], _STARTS, axis=0), tangent)
+        turn = 2.0 * np.pi * loops.column_scale[limits.index]
+        width = np.minimum(limits.high - limits.low, turn)
+        centre = limits.values(loops, middle[None])[0] if width.size else width
+        start = np.clip(centre - 0.5 * width, limits.low, limits.high - width)
+        for k, low, wide in zip(limits.index, start, width, strict=True):
+            loops.tree.set_coordinate(q, int(k), low + wide * self._rng.uniform(0.0, 1.0, _STARTS))
+        return q
+
+    def _place(self, chain: ClosedChain, near: Array) -> Ground:
+        """Return one closed configuration, checked."""
+        loops, q = self._loops, np.array(near)[None]
+        if loops.m:
+            if not closed_at(loops, q[0]):
+                name, size = loops.worst(residual_of(loops, q)[0])
+                raise AssemblyError(
+                    f"the configuration near is not closed: closure {name} stays open by {size:.3g} m or rad. "
+                    "Use assemble(chain, q_actuated) to close it.",
+                    closure=name,
+                    residual=size,
+                )
+            q = polish(loops, q).q
+        x = self._limits.values(loops, q)[0] if self._limits.index.size else np.zeros(0)
+        for k, value, low, high in zip(self._limits.index, x, self._limits.low, self._limits.high, strict=True):
+            if not low - _AT_LIMIT <= value <= high + _AT_LIMIT:
+                joint = chain.actuated[int(np.flatnonzero(loops.actuated == k)[0])]
+                bound = f"must lie within its limits [{low:.6g}, {high:.6g}]"
+                raise InvalidInputError(f"actuated joint {joint} in near", float(value), bound)
+        self._tried = 1
+        return ground(loops, q)
+
+    def _too_few(self, wanted: int) -> AssemblyError:
+        name, size = self._open
+        if self._near:
+            from_where = f"{self._walked} steps from near, short of every singularity,"
+        else:
+            from_where = (
+                f"searches from {self._tried} starts (references, neutral and random configurations) closed "
+                f"{self._closed}, smallest closure residual {size:.3g}; {self._walked} steps from there"
+            )
+        return AssemblyError(
+            f"only {self._q.shape[0]} of {wanted} random configurations close away from singularities and within the "
+            f"limits of the actuated joints: {from_where} led to no more. Give near=, a closed configuration to start "
+            "from, widen the limits, or ask diagnose(chain) whether too many joints are actuated.",
+            closure=name,
+            residual=size,
+        )
+
+
+def _limits(chain: ClosedChain, loops: Loops) -> Limits:
+    """Return the limits of the actuated coordinates that are any; huge ones are none."""
+    model, index, low, high = chain.model, [], [], []
+    for k, name in zip(loops.actuated, chain.actuated, strict=True):
         joint = model.joints[model.getJointId(name)]
-        if joint.nq == 1:
-            out[i] = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-    return out
+        if joint.nq != 1:
+            continue
+        ends = float(model.lowerPositionLimit[joint.idx_q]), float(model.upperPositionLimit[joint.idx_q])
+        real = [abs(x) <= _ENDLESS * loops.column_scale[k] for x in ends]
+        if any(real):
+            index.append(int(k))
+            low.append(ends[0] if real[0] else -np.inf)
+            high.append(ends[1] if real[1] else np.inf)
+    return Limits(np.array(index, dtype=np.intp), np.array(low), np.array(high))
 
 
 def closed_at(loops: Loops, q: Array) -> bool:
     """Return whether a configuration (nq,) closes the loops, but for what rounding in a file leaves."""
     residual = residual_of(loops, q[None])[0] if loops.m else np.zeros(1)
     return bool(np.abs(residual).max() <= 1e-6 * max(1.0, loops.length))
-
-
-def _near(chain: ClosedChain, loops: Loops, near: npt.ArrayLike) -> Array:
-    q = np.array(checked("near", near, (chain.nq,)))[None]
-    if loops.m:
-        if not closed_at(loops, q[0]):
-            name, size = loops.worst(residual_of(loops, q)[0])
-            raise AssemblyError(
-                f"the configuration near is not closed: closure {name} stays open by {size:.3g} m or rad. "
-                "Use assemble(chain, q_actuated) to close it.",
-                closure=name,
-                residual=size,
-            )
-        q = polish(loops, q).q
-    return np.repeat(q, _SEEDS, axis=0)
-
-
-def _walk(
-    chain: ClosedChain, loops: Loops, q: Array, rng: np.random.Generator, steps: int, *, careful: bool
-) -> tuple[Array, Array]:
-    """Walk at random from every q (k, nq); return all regular stops and their N.
-
-    A careful walk makes steps so short that the smallest singular value cannot pass through zero on the way: where
-    two branches of a mechanism meet, it does not jump from one to the other.
-    """
-    limits = _limits(chain, loops)
-    actuated, passive = loops.actuated, loops.passive
-    room = 0.5 * float((np.ptp(limits, axis=1) / loops.column_scale[actuated]).min())
-    N, sigma, sign = _complement(loops, q)
-    kept = [(q[sigma > _REGULAR], N[sigma > _REGULAR])]
-    heading = rng.normal(size=(q.shape[0], actuated.size))
-    for _ in range(steps):
-        tangent = np.matmul(N, (heading * loops.column_scale[actuated])[..., None])[..., 0]
-        size = np.abs(tangent / loops.column_scale).max(axis=1)
-        longest = np.minimum(_STEP, _CAREFUL * sigma) if careful else np.full(q.shape[0], 2.0 * _STEP)
-        longest = np.minimum(longest, room)
-        tangent *= (rng.uniform(0.3, 1.0, size.size) * longest / np.maximum(size, 1e-12))[:, None]
-        trial = loops.tree.integrate(q, tangent)
-        ok = _within(loops, trial, limits)
-        if loops.m:
-            closed = polish(loops, trial)
-            moved = np.abs(tangent[:, passive] / loops.column_scale[passive]).max(axis=1, initial=0.0)
-            ok &= closed_enough(loops, closed.residual, 1e-12) & (closed.correction < 0.4 * np.maximum(moved, 0.01))
-            trial = closed.q
-        N_new, sigma_new, sign_new = _complement(loops, trial)
-        ok &= (sign_new == sign).all(axis=1) & (sigma_new > _REGULAR)
-        q, N = np.where(ok[:, None], trial, q), np.where(ok[:, None, None], N_new, N)
-        sigma = np.where(ok, sigma_new, sigma)
-        heading = np.where(ok[:, None], heading, -heading) + 0.3 * rng.normal(size=heading.shape)
-        heading /= np.linalg.norm(heading, axis=1, keepdims=True)
-        kept.append((q[ok], N[ok]))
-    return np.concatenate([k[0] for k in kept]), np.concatenate([k[1] for k in kept])
-
-
-def _within(loops: Loops, q: Array, limits: Array) -> npt.NDArray[np.bool_]:
-    ok = np.ones(q.shape[0], dtype=np.bool_)
-    for k, (low, high) in zip(loops.actuated, limits, strict=True):
-        x = loops.tree.coordinate(q, int(k))
-        if high - low < 2.0 * _WIDE * loops.column_scale[k]:
-            ok &= (x >= low) & (x <= high)
-    return ok
-
-
-def _complement(loops: Loops, q: Array) -> tuple[Array, Array, Array]:
-    """Return N (n, nv, na), zero where singular, with the singular value and the sign of the passive Jacobian."""
-    n = q.shape[0]
-    N = np.zeros((n, loops.tree.nv, loops.actuated.size))
-    N[:, loops.actuated, np.arange(loops.actuated.size)] = 1.0
-    if not loops.m:
-        return N, np.ones(n), np.ones((n, 0))
-    poses = loops.tree.poses(q)
-    blocks = loops.blocks(poses, loops.pairs(poses))
-    passive = loops.passive_map(blocks)
-    block = passive.complement(blocks)
-    N[:, loops.passive] = np.where(np.isfinite(block), block, 0.0)
-    return N, passive.sigma, passive.sign
-
-
-def _too_few(loops: Loops, found: int, wanted: int, residual: float) -> AssemblyError:
-    name = loops.closures[0].name if loops.closures else "none"
-    nearest = f" (smallest closure residual {residual:.3g})" if np.isfinite(residual) else ""
-    return AssemblyError(
-        f"only {found} of {wanted} random configurations close away from singularities and within the limits of the "
-        f"actuated joints{nearest}. Give near=, a closed configuration to start from, or ask diagnose(chain) whether "
-        "too many joints are actuated.",
-        closure=name,
-        residual=residual,
-    )
