@@ -18,7 +18,7 @@ from fivebar_pin._newton import Limits, polish, residual_of, search
 from fivebar_pin._once import once_per_chain
 from fivebar_pin._tree import Poses
 from fivebar_pin.balancing._parameters import Space, plane_axes
-from fivebar_pin.balancing._walk import REGULAR, Ground, Walk, ground
+from fivebar_pin.balancing._walk import HELD, Ground, Walk, ground
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 
@@ -32,6 +32,7 @@ _WALKERS = 48  # walkers at least, several from one place when these are few
 _ROUND, _LONG = 4, 80  # steps of a round, when they set out from many places and when from few
 _ROUNDS = 24  # rounds before too few samples are an error
 _KEPT = 1024  # samples kept of a round
+_USUAL = 0.1  # share of the usual hold of the motors on the mechanism (`Ground.control`) that is worth a sample [-]
 _ENDLESS = 1e3  # joint limits beyond this [rad, or chain lengths] are none
 _AT_LIMIT = 1e-9  # how far beyond a limit a configuration still lies on it [rad or m]
 _SHELF = 8  # draws remembered for one chain
@@ -166,6 +167,7 @@ class _Draw:
         walkers = places.of(np.resize(np.arange(n), max(_WALKERS, n)) if n else np.arange(0))
         self._steps = _ROUND if n >= _MANY else _LONG
         self._walk = Walk(self._loops, self._limits, walkers, self._rng, careful=self._near)
+        self._fit = max(HELD, _USUAL * float(np.median(places.control))) if n else HELD
         self._q, self._N = self._mixed([places])
 
     def first(self, count: int) -> tuple[Array, Array]:
@@ -186,7 +188,7 @@ class _Draw:
 
     def _mixed(self, stops: Sequence[Ground]) -> tuple[Array, Array]:
         """Return q and N of some of the stops that are fit for samples, in random order."""
-        fit = [stop.control > REGULAR for stop in stops]
+        fit = [stop.control > self._fit for stop in stops]
         q = np.concatenate([stop.q[ok] for stop, ok in zip(stops, fit, strict=True)])
         T = np.concatenate([stop.T[ok] for stop, ok in zip(stops, fit, strict=True)])
         pick = self._rng.permutation(q.shape[0])[:_KEPT]
@@ -204,7 +206,7 @@ class _Draw:
                 q = polish(loops, q).q
                 self._note(q)
             here = ground(loops, q)
-            good = here.regular() & (here.control > REGULAR) & self._limits.inside(loops, q)
+            good = here.regular() & (here.control > HELD) & self._limits.inside(loops, q)
             if loops.m:
                 good &= ~loops.opposed(loops.pairs(loops.tree.poses(q)))
             self._tried += starts.shape[0]

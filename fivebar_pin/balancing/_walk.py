@@ -17,7 +17,8 @@ from fivebar_pin._arrays import Array
 from fivebar_pin._loops import Loops, inverse
 from fivebar_pin._newton import Limits
 
-REGULAR = 1e-3  # scaled smallest singular value of a configuration worth keeping [-]
+HELD = 1e-6  # scaled smallest singular value of the passive columns where the motors still hold the mechanism [-]
+_REGULAR = 1e-3  # scaled smallest singular value of all columns where the mechanism does not branch [-]
 _LONGEST, _SHORTEST = 0.7, 1e-4  # steps of a walk [rad, or chain lengths]
 _CAREFUL = 0.2  # longest step of a careful walk over the smallest singular value [rad, or chain lengths]
 _TIED = 1e-6  # scaled closure rate that velocities along the tangent may have left [-]
@@ -55,7 +56,7 @@ class Ground:
 
     def regular(self) -> npt.NDArray[np.bool_]:
         """Return where it is closed and the mechanism does not branch (n,)."""
-        return np.asarray((self.residual <= _CLOSED) & (self.sigma > REGULAR) & (self.tied < _TIED))
+        return np.asarray((self.residual <= _CLOSED) & (self.sigma > _REGULAR) & (self.tied < _TIED))
 
     def replaced(self, where: npt.NDArray[np.bool_], other: Ground) -> Ground:
         """Return the same with some walkers (n,) moved to where others stand."""
@@ -159,13 +160,13 @@ class Walk:
         there, detour = close(loops, loops.tree.integrate(here.q, step * loops.column_scale), longest)
         went = there.regular() & (detour <= longest) & self._limits.inside(loops, there.q)
         if self._careful:
-            went &= (there.sign == here.sign).all(axis=1) & (there.control > REGULAR)
+            went &= (there.sign == here.sign).all(axis=1) & (there.control > HELD)
         self.here = here.replaced(went, there)
         self._reach = np.clip(np.where(went, 1.5, 0.5) * self._reach, self._shortest, _LONGEST)
         turned = np.where(went[:, None], along, -along)
         size = np.linalg.norm(turned, axis=1, keepdims=True)
         self._heading = self._straight(turned / np.maximum(size, 1e-12) + self._noise())
-        return there.of(np.flatnonzero(went & (there.control > REGULAR)))
+        return there.of(np.flatnonzero(went))
 
     def _noise(self) -> Array:
         shape = self._heading.shape
