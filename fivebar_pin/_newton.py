@@ -156,9 +156,7 @@ def search(
     return q
 
 
-def _normal(
-    loops: Loops, q: Array, columns: npt.NDArray[np.intp], limits: Limits | None
-) -> tuple[Array, Array, Array]:
+def _normal(loops: Loops, q: Array, columns: npt.NDArray[np.intp], limits: Limits | None) -> tuple[Array, Array, Array]:
     """Return half the squared scaled residual (n,), its gradient (n, k, 1) and Gauss-Newton matrix (n, k, k)."""
     poses = loops.tree.poses(q)
     pairs = loops.pairs(poses)

@@ -34,13 +34,13 @@ def six_bar(kind: str, seed: int, *, home: bool = False) -> fb.ClosedChain:
 def _planar(name: str, links: list, points: dict, ground: int, rng: np.random.Generator, *, home: bool):
     """Build a planar linkage of one degree of freedom from its graph, breadth first from the ground."""
     b = _Builder(name, rng)
-    owner, place, used = {ground: 0}, {ground: ORIGIN}, set()
+    owner, used = {ground: 0}, set()
     queue = [ground]
     while queue:
         link = queue.pop(0)
         for j in links[link]:
             (other,) = (k for k, joints in enumerate(links) if j in joints and k != link)
-            if j in used or (other in owner and j not in used):
+            if other in owner:
                 continue
             used.add(j)
             where = pin.SE3(np.eye(3), np.r_[points[j], 0.0])
@@ -102,7 +102,9 @@ def planar_rrr(legs: int, seed: int, *, home: bool = False) -> fb.ClosedChain:
     b = _Builder(f"planar_{legs}rrr_{seed}", rng)
     turn = 2.0 * np.pi * (np.arange(legs) + rng.uniform(-0.3, 0.3, legs)) / legs
     bases = np.exp(1j * turn) * rng.uniform(0.8, 1.2, legs)
-    ends = np.exp(1j * (turn + rng.uniform(-0.5, 0.5))) * rng.uniform(0.2, 0.45, legs) + complex(*rng.normal(0, 0.05, 2))
+    ends = np.exp(1j * (turn + rng.uniform(-0.5, 0.5))) * rng.uniform(0.2, 0.45, legs) + complex(
+        *rng.normal(0, 0.05, 2)
+    )
     away = ends - bases
     elbows = bases + 0.5 * away + 1j * away * rng.choice([-1.0, 1.0], legs) * rng.uniform(0.3, 0.7, legs)
     platform = 0

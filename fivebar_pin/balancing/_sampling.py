@@ -150,7 +150,7 @@ def _shelf_of(chain: ClosedChain) -> _Shelf:
 
 
 class _Draw:
-    """The samples of one chain, place and seed that were asked for so far. It holds no chain, so that it can be kept."""
+    """The samples of one chain, place and seed that were asked for so far; kept, so it holds no chain."""
 
     def __init__(self, chain: ClosedChain, near: Array | None, seed: int) -> None:
         self._loops = loops_of(chain)

@@ -1,9 +1,9 @@
 """Walking on the closed configurations of a chain.
 
 With J the scaled closure Jacobian, r its rank at closed configurations and T the last nv - r directions of a complete
-orthogonal factorisation of J, velocities T x keep the loops closed, whatever joints are actuated. A step goes along T and
-comes back to the closures by Newton steps of least length in all coordinates; so it does not stop where the actuated
-joints lose control, only where the mechanism itself branches.
+orthogonal factorisation of J, velocities T x keep the loops closed, whatever joints are actuated. A step goes along T
+and comes back to the closures by Newton steps of least length in all coordinates; so it does not stop where the
+actuated joints lose control, only where the mechanism itself branches.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ class Walk:
         self._heading = self._straight(rng.normal(size=(n, loops.tree.nv)))
 
     def step(self) -> Ground:
-        """Let every walker take a step, and return where those stand that could; they halve theirs if they could not."""
+        """Let every walker take a step, shorter next time where it could not; return where those stand that could."""
         loops, here = self._loops, self.here
         along = np.matmul(here.T, np.matmul(np.swapaxes(here.T, 1, 2), self._heading[..., None]))[..., 0]
         length = np.minimum(self._reach, _CAREFUL * here.sigma) if self._careful else self._reach

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, frozen
 from fivebar_pin._loops import loops_of
@@ -46,9 +47,10 @@ def branches(
     together: BalanceConditions,
     *,
     named: Sequence[Array] = (),
+    gravity: npt.ArrayLike | Literal["any", "model"] = "any",
+    about: npt.ArrayLike = (0.0, 0.0, 0.0),
     tries: int = 4,
     seed: int = 0,
-    **options: Any,
 ) -> tuple[Branch, ...]:
     """Return the branches found that have fewer conditions than all assembly modes together.
 
@@ -58,16 +60,16 @@ def branches(
         chain: the mechanism.
         together: its conditions on all assembly modes.
         named: closed configurations (nq,) whose branches are asked for.
+        gravity, about: as for `balance_conditions`, those of `together`.
         tries: number of random configurations to start from.
         seed: of the configurations.
-        **options: gravity, about, as for `balance_conditions`.
     """
     found: list[Branch] = []
     space: SpaceName = "planar" if together.space.planar else "spatial"
-    starts = [*named, *random_samples(chain, 10, seed=seed).q[:tries]]
+    starts = [*named, *random_samples(chain, tries, seed=seed).q]
     for k, q in enumerate(starts):
         try:
-            own = balance_conditions(chain, together.kind, near=q, space=space, seed=seed, **options)
+            own = balance_conditions(chain, together.kind, gravity=gravity, about=about, near=q, space=space, seed=seed)
         except FiveBarPinError:
             continue  # a stretch too short to decide a rank: nothing to be gained there
         if own.rank < together.rank and not any(_alike(own, b.conditions) for b in found):

@@ -18,13 +18,15 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from fivebar_pin._arrays import Array, checked, frozen, skew
 from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
 from fivebar_pin.balancing._state import State
-from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.closures import Closure
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
 __all__ = ["KINDS", "BalanceConditions", "balance_conditions"]
@@ -32,6 +34,8 @@ __all__ = ["KINDS", "BalanceConditions", "balance_conditions"]
 KINDS = ("force", "moment", "dynamic", "static")
 _SMALL = 1e-6  # a singular value this far below the largest may be counted as zero [-]
 _CLEAR = 1e3  # ratio of neighbouring singular values that counts as a clear decision [-]
+_DOUBLINGS = 4  # how often the samples are doubled while the decision is not clear
+_ALIKE = 1e-9  # difference up to which directions [-], points, placements and configurations are the same [m, rad]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -50,6 +54,9 @@ class BalanceConditions:
         singular_values: of the stacked regressor, scaled, relative to the largest.
         gap: ratio of the last singular value that counts to the first that does not.
         samples: number of configurations used.
+        gravity: direction (3,) that static conditions hold for, or None for any.
+        about: point (3,) of the angular momentum [m].
+        near: closed configuration (nq,) whose branch alone they hold on, or None for all assembly modes.
     """
 
     chain: ClosedChain
@@ -63,6 +70,9 @@ class BalanceConditions:
     singular_values: Array
     gap: float
     samples: int
+    gravity: Array | None
+    about: Array
+    near: Array | None
 
     def __repr__(self) -> str:
         where = "planar" if self.space.planar else "spatial"
@@ -132,13 +142,14 @@ def balance_conditions(
         near: closed configuration (nq,): balance only the branch that it can reach. By default the conditions hold on
             every assembly mode; they differ only for special lengths (parallelograms and the like).
         space: "planar" (four parameters per body, in-plane force and moment), "spatial" (ten), or "auto".
-        samples: number of configurations; from the number of bodies unless given.
+        samples: number of configurations; from the number of bodies unless given, and more while the rank is not
+            clear.
         seed: of the samples.
 
     Raises:
         UnknownNameError: a kind that does not exist.
         AssemblyError: too few configurations close.
-        SolverError: the singular values show no clear gap.
+        SolverError: the singular values show no clear gap, however many samples are taken.
     """
     if kind not in KINDS:
         raise UnknownNameError("kind of balance", kind, KINDS)
@@ -146,10 +157,91 @@ def balance_conditions(
     if not isinstance(count, (int, np.integer)) or count < 10:
         raise InvalidInputError("samples", samples, "must be an integer of at least 10")
     point = checked("about", about, (3,))
+    direction = _direction(chain, gravity) if kind == "static" else None
     drawn = random_samples(chain, int(count), near=near, seed=seed)
     found = space_of(chain, drawn, space)
-    rows = _rows(chain, drawn, found, kind, _direction(chain, gravity) if kind == "static" else None, point)
-    return _decide(chain, kind, found, rows, len(drawn))
+    used, stacked, R = 0, 0, np.zeros((0, found.scale.size))
+    for _ in range(_DOUBLINGS + 1):
+        rows = _rows(chain, drawn, found, kind, direction, point)
+        used, stacked, R = used + len(drawn), stacked + rows.shape[0], _triangle(R, rows)
+        _, s, Vt = np.linalg.svd(R)
+        rank, gap = _gap(s)
+        if not rank or (gap >= _CLEAR and stacked > rank):
+            break
+        drawn = random_samples(chain, 2 * used, near=near, seed=seed, skip=used)
+    else:
+        raise SolverError(
+            f"the singular values of the {kind} conditions of {chain.name} show no clear gap (best ratio {gap:.3g} "
+            f"after {rank}, must reach {_CLEAR:g}) over {used} configurations. Use more samples, or a range of motion "
+            "away from singularities.",
+            residual=gap,
+            tolerance=_CLEAR,
+        )
+    return _conditions(chain, kind, found, s, Vt[:rank], gap, used, direction, point, near)
+
+
+def conditions_for(
+    chain: ClosedChain,
+    kind: str,
+    given: BalanceConditions | None,
+    *,
+    gravity: npt.ArrayLike | Literal["any", "model"],
+    about: npt.ArrayLike,
+    near: npt.ArrayLike | None,
+    space: SpaceName,
+    seed: int,
+) -> BalanceConditions:
+    """Return given conditions once it is checked that they are the ones asked for, or find them.
+
+    Args:
+        given: conditions found before, for the same mechanism with whatever masses, or None.
+        chain, kind, gravity, about, near, space, seed: as for `balance_conditions`. Given conditions of one branch
+            need no `near`.
+
+    Raises:
+        InvalidInputError: the given conditions belong to another mechanism or other arguments.
+    """
+    if given is None:
+        return balance_conditions(chain, kind, gravity=gravity, about=about, near=near, space=space, seed=seed)
+    if not _same_mechanism(chain, given.chain):
+        raise InvalidInputError("conditions", given, f"must belong to {chain.name}: its joints, lengths and closures")
+    if given.kind != kind:
+        raise InvalidInputError("conditions", given, f"must be of kind {kind!r}")
+    if space != "auto" and given.space.planar != (space == "planar"):
+        raise InvalidInputError("conditions", given, f"must be {space}")
+    if near is not None and not _close(given.near, checked("near", near, (chain.nq,))):
+        raise InvalidInputError("conditions", given, "must be those of the branch of near")
+    if kind == "static" and not _close(given.gravity, _direction(chain, gravity)):
+        raise InvalidInputError("conditions", given, f"must hold for gravity = {gravity!r}")
+    if kind == "moment" and not _close(given.about, checked("about", about, (3,))):
+        raise InvalidInputError("conditions", given, f"must be about {about!r}")
+    return given
+
+
+def _close(a: Array | None, b: Array | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return bool(np.abs(a - b).max(initial=0.0) <= _ALIKE)
+
+
+def _same_mechanism(a: ClosedChain, b: ClosedChain) -> bool:
+    """Whether two chains differ in nothing but masses, motors and names."""
+    if a is b:
+        return True
+    one, two = a.model, b.model
+    if a.joints != b.joints or a.nq != b.nq or len(a.closures) != len(b.closures):
+        return False
+    tree = list(one.parents) == list(two.parents) and all(
+        M.isApprox(W, _ALIKE) and j == k
+        for M, W, j, k in zip(one.jointPlacements, two.jointPlacements, one.joints, two.joints, strict=True)
+    )
+    return tree and all(_same_closure(one, c, two, d) for c, d in zip(a.closures, b.closures, strict=True))
+
+
+def _same_closure(one: pin.Model, c: Closure, two: pin.Model, d: Closure) -> bool:
+    frames = [(find_frame(one, f), find_frame(two, g)) for f, g in zip(c.frames, d.frames, strict=True)]
+    alike = all(f.parentJoint == g.parentJoint and f.placement.isApprox(g.placement, _ALIKE) for f, g in frames)
+    return alike and c.kind is d.kind and _close(np.asarray(c.axis), np.asarray(d.axis))
 
 
 def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Array) -> tuple[Array, Array]:
@@ -198,32 +290,40 @@ def _rows(chain: ClosedChain, samples: Samples, space: Space, kind: str, gravity
     return np.concatenate([p.reshape(-1, p.shape[-1]) for p in parts])
 
 
-def _decide(chain: ClosedChain, kind: str, space: Space, rows: Array, samples: int) -> BalanceConditions:
-    R = np.linalg.qr(rows, mode="r") if rows.shape[0] > rows.shape[1] else rows
-    _, s, Vt = np.linalg.svd(R)
-    rank, gap = _gap(s)
-    relative = s / s[0] if s.size and s[0] > 0.0 else s
-    if rank and gap < _CLEAR:
-        raise SolverError(
-            f"the singular values of the {kind} conditions of {chain.name} show no clear gap (best ratio {gap:.3g} "
-            f"after {rank}, must reach {_CLEAR:g}). Use more samples, or a range of motion away from singularities.",
-            residual=gap,
-            tolerance=_CLEAR,
-        )
-    basis = Vt[:rank]
+def _triangle(R: Array, rows: Array) -> Array:
+    """Return rows that span the same as both, at most as many as there are columns."""
+    stacked = np.concatenate([R, rows])
+    return np.asarray(np.linalg.qr(stacked, mode="r")) if stacked.shape[0] > stacked.shape[1] else stacked
+
+
+def _conditions(
+    chain: ClosedChain,
+    kind: str,
+    space: Space,
+    s: Array,
+    basis: Array,
+    gap: float,
+    samples: int,
+    gravity: Array | None,
+    about: Array,
+    near: npt.ArrayLike | None,
+) -> BalanceConditions:
     echelon = _echelon(basis, space)
     return BalanceConditions(
         chain=chain,
         kind=kind,
         space=space,
-        rank=rank,
+        rank=basis.shape[0],
         basis=frozen(basis),
         matrix=frozen((basis / space.scale) @ space.selection()),
         rows=frozen(echelon / np.linalg.norm(echelon, axis=1, keepdims=True)),
         reduced=frozen(_readable(echelon, space)),
-        singular_values=frozen(relative),
+        singular_values=frozen(s / s[0] if s.size and s[0] > 0.0 else s),
         gap=gap,
         samples=samples,
+        gravity=None if gravity is None else frozen(gravity),
+        about=frozen(about),
+        near=None if near is None else frozen(np.array(near, dtype=np.float64)),
     )
 
 

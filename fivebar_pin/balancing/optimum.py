@@ -13,7 +13,7 @@ from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._sampling import SpaceName
 from fivebar_pin.balancing._setup import MassBounds
 from fivebar_pin.balancing.branches import Branch, branches, configurations_meant
-from fivebar_pin.balancing.conditions import balance_conditions
+from fivebar_pin.balancing.conditions import BalanceConditions, conditions_for
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.pieces import Piece
 from fivebar_pin.balancing.problem import balance_problem
@@ -44,6 +44,7 @@ def balance(
     near: npt.ArrayLike | None = None,
     space: SpaceName = "auto",
     seed: int = 0,
+    conditions: BalanceConditions | None = None,
 ) -> Design:
     """Find the globally optimal balanced design, or prove that there is none.
 
@@ -73,6 +74,8 @@ def balance(
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
         gravity, about, near, space, seed: as for `balance_conditions`.
+        conditions: of this mechanism and kind, with the same arguments, where they were found before; a sweep over
+            bounds or objectives then finds them once.
 
     Returns:
         The design; ask its `feasible`, `chain`, `certificate`. Special lengths (antiparallelograms, kites) may leave no
@@ -89,7 +92,7 @@ def balance(
     """
     terms = weights_of(minimise, mode)
 
-    def solved(near: npt.ArrayLike | None) -> Design:
+    def solved(conditions: BalanceConditions | None, near: npt.ArrayLike | None) -> Design:
         problem = balance_problem(
             chain,
             kind,
@@ -109,19 +112,24 @@ def balance(
             near=near,
             space=space,
             seed=seed,
+            conditions=conditions,
         )
         return problem.solve(terms)
 
-    if near is not None or kind is None:
-        return solved(near)
+    if kind is None:
+        return solved(conditions, near)
+    conditions = conditions_for(
+        chain, kind, conditions, gravity=gravity, about=about, near=near, space=space, seed=seed
+    )
+    if conditions.near is not None:
+        return solved(conditions, conditions.near)
     together: Design | SolverError
     try:
-        together = solved(None)
+        together = solved(conditions, None)
         if together.feasible:
             return together
     except SolverError as error:
         together = error
-    conditions = balance_conditions(chain, kind, gravity=gravity, about=about, space=space, seed=seed)
     named = configurations_meant(chain, motions)
     found = branches(chain, conditions, named=named, seed=seed, gravity=gravity, about=about)
     return _on_one_branch(together, found, solved, any_branch=not named)
@@ -130,7 +138,7 @@ def balance(
 def _on_one_branch(
     together: Design | SolverError,
     found: Sequence[Branch],
-    solved: Callable[[npt.ArrayLike | None], Design],
+    solved: Callable[[BalanceConditions, npt.ArrayLike], Design],
     *,
     any_branch: bool,
 ) -> Design:
@@ -138,7 +146,7 @@ def _on_one_branch(
     possible = []
     for branch in found:
         try:
-            design = solved(branch.near)
+            design = solved(branch.conditions, branch.near)
         except SolverError:
             continue  # neither a design nor a proof there
         if design.feasible:

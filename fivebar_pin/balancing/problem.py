@@ -30,13 +30,13 @@ from fivebar_pin.balancing._quantities import MEASURES, Motions, Rows, measure, 
 from fivebar_pin.balancing._sampling import SpaceName, random_samples, space_of
 from fivebar_pin.balancing._setup import MassBounds, Setup
 from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, positive_limit
-from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
+from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, conditions_for
 from fivebar_pin.balancing.design import Asked, Design
 from fivebar_pin.balancing.pieces import THICKNESS, Piece, density_of, positive
 from fivebar_pin.balancing.regions import Region
 from fivebar_pin.balancing.solvers import Block, Certificate, Outcome, Program, solve
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.errors import SolverError, UnknownNameError
+from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
 __all__ = ["BalanceProblem", "balance_problem"]
 
@@ -294,6 +294,7 @@ def balance_problem(
     near: npt.ArrayLike | None = None,
     space: SpaceName = "auto",
     seed: int = 0,
+    conditions: BalanceConditions | None = None,
 ) -> BalanceProblem:
     """Prepare a balancing problem for several objectives; arguments as for `balance`."""
     if kind is not None and kind not in KINDS:
@@ -303,10 +304,13 @@ def balance_problem(
     check_terms(tuple(objectives), "objective")
     check_terms(dict(limits or {}), "limit")
     point = checked("about", about, (3,))
-    conditions, own = None, None
     if kind is not None:
-        conditions = balance_conditions(chain, kind, gravity=gravity, about=about, near=near, space=space, seed=seed)
-        own = conditions.space
+        conditions = conditions_for(
+            chain, kind, conditions, gravity=gravity, about=about, near=near, space=space, seed=seed
+        )
+        own, near = conditions.space, conditions.near
+    elif conditions is not None:
+        raise InvalidInputError("conditions", conditions, "have no meaning where kind is None")
     else:
         own = space_of(chain, random_samples(chain, 50, near=near, seed=seed), space)
     nothing = np.zeros((len(chain.joints), 10))
