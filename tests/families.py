@@ -182,3 +182,21 @@ def _platform(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, pin.SE3
     own = 0.5 * ring * rng.uniform(0.8, 1.2, (6, 1)) + rng.uniform(-0.05, 0.05, (6, 3))
     pose = pin.SE3(pin.rpy.rpyToMatrix(*rng.uniform(-0.2, 0.2, 2), rng.uniform(0.2, 0.5)), np.array([0.0, 0.0, 0.9]))
     return bases, np.array([pose.act(p) for p in own]), pose
+
+
+def bricard(seed: int, *, home: bool = False) -> fb.ClosedChain:
+    """Return a line-symmetric Bricard loop: six hinges, mobility one against nil by count.
+
+    Hinges 4 to 6 are hinges 1 to 3 turned by half a turn about a line; the last one is the closure.
+    """
+    rng = np.random.default_rng(seed)
+    b = _Builder(f"bricard_{seed}", rng)
+    half = pin.SE3(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
+    axes = [pin.SE3(pin.rpy.rpyToMatrix(*rng.uniform(-1.5, 1.5, 3)), rng.uniform(-0.5, 0.5, 3)) for _ in range(3)]
+    axes += [half * axis for axis in axes]
+    joint = 0
+    for k, axis in enumerate(axes[:5]):
+        joint = b.joint(joint, pin.JointModelRZ(), axis, f"hinge{k}")
+    frames = [mechanisms.point(b.model, body, f"last_{body}", b.world[body].inverse() * axes[5]) for body in (0, joint)]
+    b.closures.append(fb.Closure((frames[0], frames[1]), "revolute", name="last"))
+    return b.chain(("hinge0",), home=home)

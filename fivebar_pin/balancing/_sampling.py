@@ -30,7 +30,7 @@ _SEARCH = 60  # steps of a search
 _MANY = 16  # places that walkers set out from that are many
 _WALKERS = 48  # walkers at least, several from one place when these are few
 _ROUND, _LONG = 4, 80  # steps of a round, when they set out from many places and when from few
-_ROUNDS = 24  # rounds before too few samples are an error
+_ROUNDS, _IDLE = 400, 12  # rounds of one request, and of them without a sample in turn, before it is an error
 _KEPT = 1024  # samples kept of a round
 _USUAL = 0.1  # share of the usual hold of the motors on the mechanism (`Ground.control`) that is worth a sample [-]
 _ENDLESS = 1e3  # joint limits beyond this [rad, or chain lengths] are none
@@ -176,12 +176,12 @@ class _Draw:
         Raises:
             AssemblyError: the walks lead to fewer.
         """
-        rounds = _ROUNDS if self._closed else 0
-        while self._q.shape[0] < count and rounds:
+        rounds = idle = 0
+        while self._closed and self._q.shape[0] < count and rounds < _ROUNDS and idle < _IDLE:
             q, N = self._mixed([self._walk.step() for _ in range(self._steps)])
             self._q, self._N = np.concatenate([self._q, q]), np.concatenate([self._N, N])
             self._walked += self._steps
-            rounds -= 1
+            rounds, idle = rounds + 1, 0 if q.shape[0] else idle + 1
         if self._q.shape[0] < count:
             raise self._too_few(count)
         return self._q[:count], self._N[:count]
@@ -203,8 +203,8 @@ class _Draw:
             q = starts
             if loops.m:
                 q = search(loops, starts, columns=np.arange(loops.tree.nv), limits=self._limits, iterations=_SEARCH)
-                q = polish(loops, q).q
                 self._note(q)
+                q = polish(loops, q).q
             here = ground(loops, q)
             good = here.regular() & (here.control > HELD) & self._limits.inside(loops, q)
             if loops.m:
@@ -218,7 +218,7 @@ class _Draw:
     def _note(self, q: Array) -> None:
         """Remember what stays open the least, as evidence."""
         residual = residual_of(self._loops, q)
-        name, size = self._loops.worst(residual[int(np.argmin(np.abs(residual).max(axis=1)))])
+        name, size = self._loops.worst(residual[int(np.argmin(np.linalg.norm(residual, axis=1)))])
         if not size >= self._open[1]:
             self._open = name, size
 
