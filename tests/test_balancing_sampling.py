@@ -11,6 +11,7 @@ from pathlib import Path
 import families
 import mechanisms
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
@@ -150,6 +151,39 @@ def test_samples_reach_every_assembly_mode() -> None:
     assert len(np.unique(np.sign(np.sin(q[:, lower])), axis=0)) == 8
     q = random_samples(mechanisms.parallelogram(), 200).q
     assert 0.2 < np.mean(np.abs(np.sin(q[:, 0] + q[:, 1])) < 1e-9) < 0.8
+
+
+@pytest.mark.parametrize("make", [families.six_bar, families.planar_rrr], ids=["six-bar", "14-RRR"])
+def test_one_reference_configuration_is_enough_to_walk_from(make: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_sampling, "_STARTS", 0)
+    kind = {families.six_bar: "watt", families.planar_rrr: 14}[make]  # type: ignore[index]
+    chain = make(kind, 5, home=True)  # type: ignore[operator]
+    model = chain.model.copy()
+    for joint in list(model.joints)[1:]:  # the neutral configuration is far beyond the limits
+        at = chain.references["home"][joint.idx_q]
+        model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q] = at - 0.05, at + 0.05
+    chain = fb.ClosedChain(model, chain.closures, chain.actuated)
+    assert ranks(chain) == planar_rule(chain)
+    draw = _sampling._shelf_of(chain)._draws[b"", 0]
+    assert draw._tried == 2
+
+
+def test_samples_lie_where_the_motors_hold_the_mechanism() -> None:
+    """Next to a singularity a velocity of one at the motors moves some joint hundreds of times as fast."""
+    for chain in (mechanisms.five_bar(), mechanisms.four_bar((1.0, 0.6, 0.8, 0.9)), families.six_bar("watt", 3)):
+        speed = np.abs(fb.complement(chain, random_samples(chain, 1000).q)).max(axis=(1, 2))
+        assert speed.max() < 30.0 * np.median(speed)
+
+
+def test_a_hinge_does_not_close_with_its_axes_against_each_other() -> None:
+    chain, _ = mechanisms.rscr()
+    q = random_samples(chain, 200).q
+    data, model = chain.model.createData(), chain.model
+    first, second = (model.getFrameId(name) for name in chain.closures[0].frames)
+    for one in q:
+        pin.framesForwardKinematics(model, data, one)
+        axes = [data.oMf[k].rotation @ chain.closures[0].axis for k in (first, second)]
+        assert axes[0] @ axes[1] > 1.0 - 1e-9
 
 
 @pytest.mark.parametrize("seed", range(4))
