@@ -139,6 +139,7 @@ def test_a_stewart_platform_moves_within_the_strokes_of_its_legs() -> None:
     low[rods], high[rods] = q[rods] - 0.01, q[rods] + 0.01
     chain = limited(plain, low, high)
     assert ranks(chain) == [28, 100]
+    assert _sampling._shelf_of(chain)._draws[b"", 0]._closed > 40  # of 98 starts
     x = random_samples(chain, 200).q[:, rods]
     assert (x >= low[rods]).all() and (x <= high[rods]).all()
 
@@ -196,6 +197,24 @@ def test_walks_from_a_configuration_stay_on_its_branch(seed: int) -> None:
         assert flat.all() == flat.any() == (abs(np.sin(near[0] + near[1])) < 1e-9)
         assert (np.sign(np.sin(q[:, 0])) == np.sign(np.sin(near[0]))).all()
         assert np.ptp(q[:, 0]) > 2.0
+
+
+def test_walks_from_a_configuration_turn_round_where_the_motor_loses_control() -> None:
+    """A four-bar driven at its rocker has dead points, where coupler and crank lie in line."""
+    chain = mechanisms.four_bar((0.9, 1.1, 0.4, 1.0))
+    near = fb.assembly_modes(chain, [1.0])[0]
+    sides = [
+        np.sign(np.sin(q[:, 0] + q[:, 1] - q[:, 2])) for q in (near[None], random_samples(chain, 500, near=near).q)
+    ]
+    assert (sides[1] == sides[0]).all()
+    everywhere = random_samples(chain, 500).q
+    assert len(np.unique(np.sign(np.sin(everywhere[:, 0] + everywhere[:, 1] - everywhere[:, 2])))) == 2
+
+
+def test_no_sample_has_more_motors_than_it_can_move() -> None:
+    locked = mechanisms.five_bar().with_actuated(("left", "right", "left_elbow"))
+    with pytest.raises(AssemblyError, match="too many joints are actuated"):
+        random_samples(locked, 20)
 
 
 def test_more_samples_begin_with_the_same_ones_whatever_was_asked_before() -> None:
