@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
+from fivebar_pin._once import once_per_chain
 from fivebar_pin.balancing import _sampling, balance, balance_conditions, balance_problem, conditions, pareto
 from fivebar_pin.balancing._sampling import random_samples
 from fivebar_pin.balancing.branches import branches
@@ -348,6 +349,19 @@ def test_threads_that_ask_at_once_draw_once(monkeypatch: pytest.MonkeyPatch) -> 
         drawn = list(pool.map(lambda _: random_samples(chain, 100).q, range(8)))
     assert all(np.array_equal(q, drawn[0]) for q in drawn)
     counted.once(0, 1)
+
+
+def test_what_is_made_twice_at_once_is_one_for_all() -> None:
+    chain, inner = mechanisms.five_bar(), []
+
+    @once_per_chain
+    def make(of: fb.ClosedChain) -> object:
+        if not inner:
+            inner.append(None)
+            inner[0] = make(of)  # as another thread would
+        return object()
+
+    assert make(chain) is inner[0] is make(chain)
 
 
 def test_draws_are_bounded_and_let_go_with_their_chain() -> None:
