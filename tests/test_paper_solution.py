@@ -54,10 +54,9 @@ def pinocchio_road(linkage, s, gravity):
         com.append(pin.centerOfMass(model, data, q, v, a).copy())
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
         m = pin.computeTotalMass(model)
-        force = -data.dhg.linear + m * g
-        wrench.append([*force, *(-data.dhg.angular + np.cross(com[-1], force))])
-    wrench = np.array(wrench)
-    return np.array(torque), wrench[:, :3], wrench[:, 3:], np.array(com)
+        moment = -data.dhg.angular - np.cross(com[-1], data.dhg.linear)
+        wrench.append([-data.dhg.linear, moment, m * g - data.dhg.linear, moment + np.cross(com[-1], m * g)])
+    return np.array(torque), *np.swapaxes(wrench, 0, 1), np.array(com)
 
 
 @settings(max_examples=120, deadline=None)
@@ -70,11 +69,13 @@ def test_closed_form_equals_pinocchio_on_random_linkages(state):
     reached = linkage.lengths[0] * np.exp(1j * q[0, 0]) + linkage.lengths[1] * np.exp(1j * s.theta[0])
     assert abs(reached - O3) <= 1e-12 * size
     assert s.closure_residual[0] <= 1e-13 * size
-    torque, force, moment, com = pinocchio_road(linkage, s, GRAVITY)
-    weight = np.abs(s.joint_forces).max() + np.abs(force).max()
+    torque, force, moment, frame_force, frame_moment, com = pinocchio_road(linkage, s, GRAVITY)
+    weight = np.abs(s.joint_forces).max() + np.abs(frame_force).max()
     np.testing.assert_allclose(s.torque, torque, rtol=0, atol=1e-11 * weight * size)
     np.testing.assert_allclose(s.shaking_force, force, rtol=0, atol=1e-11 * weight)
     np.testing.assert_allclose(s.shaking_moment, moment, rtol=0, atol=1e-11 * weight * size)
+    np.testing.assert_allclose(s.frame_force, frame_force, rtol=0, atol=1e-11 * weight)
+    np.testing.assert_allclose(s.frame_moment, frame_moment, rtol=0, atol=1e-11 * weight * size)
     np.testing.assert_allclose(s.com, com, rtol=0, atol=1e-13 * size)
 
 
@@ -154,8 +155,9 @@ def test_gravity_alone_loads_a_linkage_at_rest():
     q = np.array([[0.4, 1.3]])
     s = paper.solve_states(linkage, q, zero, zero, gravity=GRAVITY)
     weight = linkage.masses.sum() * np.array(GRAVITY)
-    np.testing.assert_allclose(s.shaking_force[0], weight, rtol=1e-13)
-    np.testing.assert_allclose(s.shaking_moment[0], np.cross(s.com[0], weight), atol=1e-14)
+    np.testing.assert_allclose(s.frame_force[0], weight, rtol=1e-13)
+    np.testing.assert_allclose(s.frame_moment[0], np.cross(s.com[0], weight), atol=1e-14)
+    assert not s.shaking_force.any() and not s.shaking_moment.any()
     for k in range(2):
         h = np.eye(2)[k] * 1e-6
         up, down = (paper.solve_states(linkage, q + x, zero, zero).com[0] for x in (h, -h))
@@ -165,7 +167,8 @@ def test_gravity_alone_loads_a_linkage_at_rest():
 def test_results_are_read_only():
     """Nothing can be written into a solution."""
     s = paper.solve(paper.table_1("I", "unbalanced"), paper.default_motion(samples=5))
-    for name in ("angles", "rates", "accelerations", "partials", "torque", "joint_forces", "shaking_force", "com"):
+    names = ("angles", "rates", "accelerations", "partials", "torque", "joint_forces", "shaking_force", "frame_force")
+    for name in (*names, "com"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(s, name)[0] = 0.0
     assert repr(s) == "Solution(5 samples, left mode)"
