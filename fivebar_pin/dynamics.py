@@ -28,7 +28,7 @@ from fivebar_pin import _bodies
 from fivebar_pin._arrays import Array, checked, cross, figures, frozen, numeric
 from fivebar_pin._loops import loops_of
 from fivebar_pin._once import once_per_chain
-from fivebar_pin._reactions import Reactions, reactions
+from fivebar_pin._reactions import Reactions, determinate, reactions
 from fivebar_pin._springs import JointSpring, Spring, SpringForces, checked_springs, spring_forces
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.errors import UnknownNameError
@@ -116,6 +116,16 @@ class Loads:
     def closure_reactions_local(self) -> Array:
         """The same in the axes of the closure's frame 1 (n, closures, 6) [N, N m]."""
         return self.reactions.closure_local
+
+    @cached_property
+    def bearing_force(self) -> Array:
+        """Force in every joint, then in every closure (n, nb + closures, 3) [N], as far as it is determinate.
+
+        Of a force that redundant closures share it is the part across the directions in which they can strain each
+        other: in a planar mechanism the force in the plane, whichever way this lies in the world.
+        """
+        r = self.reactions
+        return frozen(np.matmul(determinate(r.free), r.forces[..., None])[..., 0])
 
     @cached_property
     def kinetic_energy(self) -> Array:

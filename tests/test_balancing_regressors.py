@@ -54,6 +54,8 @@ def direct(chain: fb.ClosedChain, trajectory: fb.Trajectory) -> dict[str, np.nda
         "angular_momentum": momentum[:, 3:] - np.cross(ABOUT, momentum[:, :3]),
         "shaking_force": loads.shaking_force,
         "shaking_moment": loads.shaking_moment,
+        "frame_force": loads.frame_force,
+        "frame_moment": loads.frame_moment,
         "torque": loads.torque,
         "gravity_torque": inverse_dynamics(chain, at_rest).torque,
         "potential_energy": loads.potential_energy[:, None],

@@ -449,6 +449,24 @@ def test_a_balanced_five_bar_does_not_shake_by_the_digits_of_its_weight(gravity)
 
 
 @EACH
+def test_bearing_forces_are_the_determinate_part_of_the_reactions(loads, case):
+    """Where nothing is open they are the reactions; in a plane, however it lies, what is known in the joint's axes."""
+    x = loads[case]
+    nb = len(x.chain.joints)
+    assert x.bearing_force.shape == (len(x.trajectory), nb + len(x.chain.closures), 3)
+    world = np.concatenate([x.joint_reactions, x.closure_reactions], axis=1)[..., :3]
+    local = np.concatenate([x.joint_reactions_local, x.closure_reactions_local], axis=1)[..., :3]
+    known = np.isfinite(world)
+    scale = np.nanmax(np.abs(local), initial=1.0)
+    np.testing.assert_allclose(x.bearing_force[known], world[known], rtol=0.0, atol=1e-11 * scale)
+    if case != "Bennett":  # nothing is known there in any axes
+        joints = slice(0, nb)
+        size = np.linalg.norm(np.nan_to_num(local[:, joints]), axis=2)
+        found = np.linalg.norm(x.bearing_force[:, joints], axis=2)
+        np.testing.assert_allclose(found, size, rtol=0.0, atol=1e-11 * scale)
+
+
+@EACH
 def test_scales_bound_their_quantities_and_tell_round_off_from_results(loads, case):
     """No value is larger than the sum of sizes it is made of; a sum much larger than its value means cancellation."""
     x = loads[case]
