@@ -107,14 +107,14 @@ class Design:
             return f"Design({self.original.name!r}, {self.kind}: infeasible; {self.certificate}{hint})"
         where = "" if self.branch is None else f", only on the branch of {self.branch.round(6).tolist()}"
         return (
-            f"Design({self.original.name!r}, {self.kind}: {self.status}, objective {self._objective()}, "
+            f"Design({self.original.name!r}, {self.kind}: {self.status}, objective {self.objective_text()}, "
             f"gap {self.gap:.1e}, residual {self.residual:.1e}{where})"
         )
 
-    def _objective(self) -> str:
+    def objective_text(self, *, digits: int = 6) -> str:
         """Return the objective in figures; 0 where every term of it is round-off."""
-        settled_terms = [settled(x, self.scale(term)) for term, x in self.terms.items()]
-        return figures(self.objective if any(settled_terms) else 0.0, digits=6)
+        some = any(settled(x, self.scale(term)) for term, x in self.terms.items())
+        return figures(self.objective if some else 0.0, digits=digits)
 
     def __str__(self) -> str:
         lines = [repr(self)]
