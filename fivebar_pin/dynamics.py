@@ -25,7 +25,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _bodies
-from fivebar_pin._arrays import Array, checked, cross, figures, frozen, numeric
+from fivebar_pin._arrays import Array, checked, cross, figures, frozen, numeric, settled
 from fivebar_pin._loops import loops_of
 from fivebar_pin._once import once_per_chain
 from fivebar_pin._reactions import Reactions, determinate, reactions
@@ -72,9 +72,7 @@ class Loads:
 
     def __repr__(self) -> str:
         names = ("torque", "shaking_force", "shaking_moment", *(("frame_force", "frame_moment") if self.loaded else ()))
-        peak = {x: float(np.abs(getattr(self, x)).max(initial=0.0)) for x in names[:1]}
-        peak |= {x: float(np.linalg.norm(getattr(self, x), axis=1).max(initial=0.0)) for x in names[1:]}
-        words = ", ".join(f"{x} {figures(value, self.scale(x))}" for x, value in peak.items())
+        words = ", ".join(f"{x} {figures(self.peak(x))}" for x in names)
         return f"Loads({len(self.trajectory)} samples; peaks: {words})"
 
     @property
@@ -161,13 +159,28 @@ class Loads:
             tree, _bodies.Bodies.of(self.chain), poses, tree.rates(q, v, poses), self.trajectory.a
         )
 
+    def peak(self, quantity: str) -> float:
+        """Return the largest size of a quantity over the samples, 0 where it is only round-off [its unit].
+
+        Args:
+            quantity: "torque" (of any motor), "shaking_force", "shaking_moment", "frame_force", "frame_moment" or
+                "travel" (distance of the mass centre from where it starts).
+
+        Raises:
+            UnknownNameError: another quantity.
+        """
+        scale = self.scale(quantity)
+        values = self.com - self.com[0] if quantity == "travel" else getattr(self, quantity)
+        sizes = np.abs(values) if quantity == "torque" else np.linalg.norm(values, axis=1)
+        return settled(float(sizes.max(initial=0.0)), scale)
+
     def scale(self, quantity: str) -> float:
         """Return the sum of the sizes of all that adds up to a quantity, the largest over the samples [its unit].
 
         A value far below it is the round-off of this sum, not a result.
 
         Args:
-            quantity: "torque", "shaking_force", "shaking_moment", "frame_force", "frame_moment" or "com".
+            quantity: as for `peak`.
 
         Raises:
             UnknownNameError: another quantity.
@@ -195,7 +208,7 @@ class Loads:
             "shaking_moment": about,
             "frame_force": shaking + weight.sum() + pull,
             "frame_moment": about + arm @ weight + turn,
-            "com": np.linalg.norm(moving.centre, axis=2) @ mass / max(float(mass.sum()), 1e-300),
+            "travel": np.linalg.norm(moving.centre, axis=2) @ mass / max(float(mass.sum()), 1e-300),
         }
 
     def power_residual(self) -> float:

@@ -96,11 +96,6 @@ def curves(chain: ClosedChain, loads: Loads, *, frame: bool) -> list[Curve]:
     return out
 
 
-def travel(loads: Loads) -> str:
-    """Return the largest distance of the mass centre from where it starts, in figures [m]."""
-    return figures(_tables.peak(loads.com - loads.com[0]), loads.scale("com"))
-
-
 def torque_unit(chain: ClosedChain, name: str) -> str:
     """Return the unit of what a motor exerts."""
     return "N" if joint_unit(chain, name) == "m" else "N m"

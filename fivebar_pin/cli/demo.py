@@ -140,7 +140,7 @@ def _print_comparison(console: Console, runs: list[_Run]) -> None:
     headings = ("", "before: peak", "RMS", "after: peak", "RMS")
     _tables.table(console, "Before and after", headings, rows)
     rows = [
-        ["travel of the mass centre [m]", *(_output.travel(r.loads) for r in runs)],
+        ["travel of the mass centre [m]", *(figures(r.loads.peak("travel")) for r in runs)],
         ["largest residual of (60)-(69) [-]", *(figures(_condition_residual(r.linkage)) for r in runs)],
     ]
     _tables.table(console, "Balance", ("", *(r.label for r in runs)), rows)

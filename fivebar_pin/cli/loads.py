@@ -55,7 +55,7 @@ def _print(console: object, chain: ClosedChain, trajectory: Trajectory, loads: L
         ["closure residual [m or rad]", figures(trajectory.worst_closure)],
         ["motor power against rate of energy", figures(loads.power_residual())],
         ["shaking and frame wrench against sums over bodies", figures(loads.momentum_residual())],
-        ["travel of the mass centre [m]", _output.travel(loads)],
+        ["travel of the mass centre [m]", figures(loads.peak("travel"))],
     ]
     _tables.table(console, "Checks", ("", ""), rows)  # type: ignore[arg-type]
 

@@ -156,8 +156,7 @@ def com(loads: Mapping[str, Loads], *, title: str = "Path of the total mass cent
     figure, (ax,) = _sheet(1, 1, title, height=5.5)
     for k, (label, path) in enumerate(paths.items()):
         colour, dash, width = _STYLES[k % len(_STYLES)]
-        size = float(np.linalg.norm(path - path[0], axis=1).max())
-        words = f"{label}: travel {figures(1e3 * size, 1e3 * loads[label].scale('com'), digits=3)} mm"
+        words = f"{label}: travel {figures(1e3 * loads[label].peak('travel'), digits=3)} mm"
         ax.plot(1e3 * path[:, i], 1e3 * path[:, j], color=colour, linestyle=dash, linewidth=width, label=words)
         ax.plot(1e3 * path[0, i], 1e3 * path[0, j], marker="o", color=colour, markersize=7, linestyle="none")
     ax.set_xlabel(f"{'xyz'[i]} [mm]")
