@@ -134,3 +134,42 @@ def check(design: Design, path: fb.Trajectory, terms: tuple[str, ...]) -> None:
         if term in design.after:
             assert_same(design.after[term], wanted[term], size, f"after {term}")
             assert_same(design.before[term], before[term], size + before[term], f"before {term}")
+
+
+def test_a_force_balanced_four_bar_under_gravity_does_not_shake_in_words_either() -> None:
+    """Nothing is stripped for it: its weight is on the frame, not among what shakes; round-off is written as 0."""
+    chain = fb.load(fb.io.shipped_path("four_bar_crank_rocker"))
+    path = sway(chain, standing(chain), samples=41)
+    design = balance(chain, "force", motions=path)
+    assert chain.model.gravity.linear.any()
+    assert 0.0 <= design.after["rms_shaking_force"] < 1e-14 < 0.1 < design.before["rms_shaking_force"]
+    lines = str(design).splitlines()
+    assert any(line.startswith("  rms_shaking_force: 0.1") and line.endswith("-> 0") for line in lines), lines
+    assert any(line.startswith("  peak_shaking_force: 0.") and line.endswith("-> 0") for line in lines), lines
+    weight = 9.81 * design.chain.mass
+    assert f"  rms_frame_force: {design.before['rms_frame_force']:.5g} -> {weight:.5g}" in lines
+    assert "shaking_force 0," in repr(inverse_dynamics(design.chain, path))
+    table = str(compare({"before": chain, "after": design}, path))
+    assert next(line for line in table.splitlines() if line.startswith("rms_shaking_force")).split()[-1] == "0"
+    found = score(chain, path, design.parameters, terms=("mean_square_shaking_force", "added_mass"))
+    assert "mean_square_shaking_force from 0," in repr(found) and found["mean_square_shaking_force"][0] > 0.0
+    least = balance(chain, "force", motions=path, minimise="rms_shaking_force")
+    assert "objective 0," in repr(least)
+
+
+def test_without_gravity_the_frame_carries_what_shakes_it_and_is_not_told_apart() -> None:
+    chain, path = moving("five_bar_case_I")
+    design = balance(chain, "force", motions=path)
+    assert not any("frame" in name for name in design.before)
+    design = balance(chain, "force", motions=path, minimise={"rms_frame_force": 1.0, "added_mass": 1.0})
+    assert design.after["peak_frame_force"] == pytest.approx(design.after["peak_shaking_force"], abs=1e-15)
+
+
+def test_a_comparison_refers_to_the_same_point_as_the_design() -> None:
+    chain, path = moving("five_bar")
+    terms = ("rms_shaking_moment", "peak_frame_moment")
+    here, there = (compare({"a": chain}, path, terms=terms, about=about) for about in ((0.0, 0.0, 0.0), ABOUT))
+    for term in terms:
+        loads = inverse_dynamics(chain, path, about=ABOUT)
+        assert there.values[term][0] == pytest.approx(measured(chain, loads)[term], rel=1e-12)
+        assert here.values[term][0] != pytest.approx(there.values[term][0], rel=1e-3)

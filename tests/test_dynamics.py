@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -254,6 +255,19 @@ def test_closed_and_open_cut_give_the_same_reactions():
         np.testing.assert_allclose(a.joint_reactions[:, k, :2], b.joint_reactions[:, k, :2], rtol=0.0, atol=1e-10)
     # The force by the coupler on the rocker: closure of one, joint of the other.
     np.testing.assert_allclose(a.closure_reactions[:, 0, :2], b.joint_reactions[:, 2, :2], rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("swapped", ["shaking_force", "shaking_moment", "frame_force", "frame_moment"])
+def test_momentum_residual_tells_when_a_wrench_is_not_what_its_name_says(loads, swapped):
+    x = loads["RSSR"]
+    other = swapped.replace("shaking", "frame") if "shaking" in swapped else swapped.replace("frame", "shaking")
+    x = replace(x, external={x.chain.closures[0].frames[0]: np.tile([3.0, 1.0, 2.0, 0.5, 0.2, 0.1], (40, 1))})
+    assert replace(loads["RSSR"]).momentum_residual() <= 1e-12
+    assert x.momentum_residual() > 1e-3  # a force that the frame does not carry
+    assert replace(loads["RSSR"], **{swapped: getattr(loads["RSSR"], swapped) + 1e-3}).momentum_residual() > 1e-6
+    heavy = five_bar()
+    y = fb.inverse_dynamics(heavy, fb.drive(heavy, swinging(2.0, 1.0)))
+    assert replace(y, **{swapped: getattr(y, other)}).momentum_residual() > 1e-3
 
 
 def test_moment_about_another_point_shifts_with_the_force():

@@ -62,8 +62,10 @@ def run_conditions(chosen: argparse.Namespace) -> int:
     conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen))
     console = _tables.console()
     console.print(str(conditions), markup=False, soft_wrap=True)
-    residual = np.abs(conditions.residual(chain)).max(initial=0.0)
-    console.print(f"largest residual of {chain.name} as it is: {residual:.4g}", markup=False)
+    residual = float(np.abs(conditions.residual(chain)).max(initial=0.0))
+    sizes = np.abs(conditions.matrix) @ np.abs(chain.inertial_parameters.reshape(-1))
+    words = figures(residual, float(sizes.max(initial=0.0)))
+    console.print(f"largest residual of {chain.name} as it is: {words} kg", markup=False)
     return 0
 
 
