@@ -11,6 +11,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin import motion as laws
+from fivebar_pin._arrays import settled
 from fivebar_pin.balancing import Ball, Box, Design, balance, balance_problem, compare, score
 from fivebar_pin.balancing._quantities import MEASURES
 from fivebar_pin.cli._moving import standing, sway
@@ -173,3 +174,13 @@ def test_a_comparison_refers_to_the_same_point_as_the_design() -> None:
         loads = inverse_dynamics(chain, path, about=ABOUT)
         assert there.values[term][0] == pytest.approx(measured(chain, loads)[term], rel=1e-12)
         assert here.values[term][0] != pytest.approx(there.values[term][0], rel=1e-3)
+
+
+def test_a_mean_square_is_round_off_when_its_root_is() -> None:
+    """A root of 1e-7 of what adds up to it is a result; its square, 1e-14, is one too."""
+    chain, path = moving("five_bar_case_I")
+    design = balance(chain, "force", motions=path)
+    root = design.scale("rms_shaking_force")
+    for share, gone in ((1e-7, False), (1e-13, True)):
+        assert (settled(share * root, root) == 0.0) == gone
+        assert (settled((share * root) ** 2, design.scale("mean_square_shaking_force")) == 0.0) == gone
