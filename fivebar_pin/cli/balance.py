@@ -236,7 +236,7 @@ def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedCh
     made = realise(design)
     for weight in made.weights:
         console.print(f"  {weight}", markup=False, soft_wrap=True)
-    rows = [[name, f"{x:.6g}", f"{made.terms[name]:.6g}"] for name, x in made.promised.items()]
+    rows = [[name, *words] for name, words in made.figures.items()]
     _tables.table(console, "Counterweights", ("", "promised", "realised"), rows)
     console.print(f"{made.claim}", markup=False, soft_wrap=True)
     return made.chain
