@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from paper_cases import states
 
+import fivebar_pin as fb
 from fivebar_pin import paper
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError, UnknownNameError
 from fivebar_pin.motion import Motion
@@ -244,3 +245,14 @@ def test_input_of_the_wrong_form_is_refused():
         paper.solve(linkage, motion, gravity=9.81)
     with pytest.raises(InvalidInputError, match="shape of v"):
         paper.solve_states(linkage, motion.q, motion.v[:2], motion.a)
+
+
+def test_closure_residual_is_the_one_of_the_chain():
+    """Opened on purpose, the loop is as far open as the chain's own residual says, component by component."""
+    linkage = paper.table_1("I", "unbalanced")
+    s = paper.solve(linkage, paper.default_motion(samples=7))
+    wrong = replace(s, angles=s.angles + np.array([0.01, -0.02, 0.03, 0.0]))
+    rows = [fb.closure_residual(linkage.chain(), q) for q in wrong.trajectory.q]
+    expected = np.abs(rows).max(axis=1)
+    assert expected.min() > 1e-4
+    np.testing.assert_allclose(wrong.closure_residual, expected, rtol=1e-12)

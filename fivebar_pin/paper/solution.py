@@ -78,9 +78,10 @@ class Solution:
 
     @cached_property
     def closure_residual(self) -> Array:
-        """How far the loop (1) stays open, the larger of x and y, from the angles alone (n,) [m]."""
-        b = self.linkage.lengths[:4] * np.exp(1j * self.angles)
-        gap = b[:, 0] + b[:, 1] - self.linkage.lengths[4] - b[:, 3] - b[:, 2]
+        """How far the loop (1) stays open, the larger component along and across link 2, from the angles (n,) [m]."""
+        turn = np.exp(1j * self.angles)
+        b = self.linkage.lengths[:4] * turn
+        gap = (b[:, 0] + b[:, 1] - self.linkage.lengths[4] - b[:, 3] - b[:, 2]) * turn[:, 1].conj()
         return np.asarray(np.maximum(np.abs(gap.real), np.abs(gap.imag)))
 
     @cached_property
