@@ -42,16 +42,15 @@ def _rows(prepared, q):
 
 
 def torque_and_shaking(prepared, q0, motion, *, joint_forces=False):
-    """Return torque (n, na), shaking force (n, 3), moment about the origin (n, 3) and, if asked, joint forces."""
+    """Return torque (n, na), shaking force and moment about the origin (n, 3) each and, if asked, joint forces."""
     model, data, pairs, models, datas, keep, act, pas = prepared
-    n, mass = len(motion), sum(I.mass for I in model.inertias)
+    n = len(motion)
     torque, force, moment = np.empty((n, act.size)), np.empty((n, 3)), np.empty((n, 3))
     reactions = np.empty((n, model.njoints, 6)) if joint_forces else None
     q, v, a, zero = np.array(q0), np.zeros(model.nv), np.zeros(model.nv), np.zeros(model.nv)
     N = np.zeros((model.nv, act.size))
     N[act, np.arange(act.size)] = 1.0
     last = np.array(motion.q[0])
-    gravity = model.gravity.linear
     for k in range(n):
         q[act] = motion.q[k]
         q[pas] += N[pas] @ (motion.q[k] - last)
@@ -75,7 +74,7 @@ def torque_and_shaking(prepared, q0, motion, *, joint_forces=False):
         torque[k] = N.T @ tau
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
         rate, com = data.dhg, data.com[0]
-        force[k] = mass * gravity - rate.linear
+        force[k] = -rate.linear
         moment[k] = -rate.angular + np.cross(com, force[k])
         if reactions is not None:
             tau[act] -= torque[k]

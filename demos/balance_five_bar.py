@@ -6,8 +6,6 @@ python demos/balance_five_bar.py --headless  # numbers only
 
 import argparse
 
-import numpy as np
-
 import fivebar_pin as fb
 from fivebar_pin import balancing, paper, viz
 
@@ -18,10 +16,9 @@ SPEED = 0.5  # playing speed over real time [-]
 def moved(chain, motion, start, label):
     trajectory = fb.drive(chain, motion, near=start)
     shown = viz.Shown(chain, trajectory, fb.inverse_dynamics(chain, trajectory), label)
-    force = np.linalg.norm(shown.loads.shaking_force, axis=1).max()
-    torque, moment = np.abs(shown.loads.torque).max(), np.abs(shown.loads.shaking_moment).max()
+    force, moment, torque = (shown.loads.peak(x) for x in ("shaking_force", "shaking_moment", "torque"))
     print(
-        f"{label:28s} mass {chain.mass:.4f} kg   shaking force {force:9.2e} N   "
+        f"{label:28s} mass {chain.mass:.4f} kg   shaking force {force:8.4g} N   "
         f"moment {moment:.4f} N m   largest torque {torque:.4f} N m"
     )
     return shown

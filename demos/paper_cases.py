@@ -23,12 +23,11 @@ def moved(linkage, motion, label):
 
 
 def report(shown):
-    force = np.linalg.norm(shown.loads.shaking_force, axis=1)
-    travel = np.linalg.norm(shown.loads.com - shown.loads.com[0], axis=1)
-    torque, moment = np.abs(shown.loads.torque).max(axis=0), np.abs(shown.loads.shaking_moment).max()
+    force, moment, travel = (shown.loads.peak(x) for x in ("shaking_force", "shaking_moment", "travel"))
+    torque = np.abs(shown.loads.torque).max(axis=0)
     print(
-        f"{shown.label:24s} shaking force {force.max():9.3e} N   moment {moment:.4f} N m   "
-        f"torques {torque[0]:.4f}, {torque[1]:.4f} N m   COM travel {1e3 * travel.max():9.3e} mm"
+        f"{shown.label:24s} shaking force {force:8.4g} N   moment {moment:.4f} N m   "
+        f"torques {torque[0]:.4f}, {torque[1]:.4f} N m   COM travel {1e3 * travel:.4g} mm"
     )
 
 

@@ -40,8 +40,9 @@ def main():
         )
         print(f"{chain.name}: mobility {diagnosis.mobility}, closures open by {trajectory.worst_closure:.1e} m")
         print(f"  peak torque [N m]: {peaks}")
-        force = np.linalg.norm(loads.shaking_force - loads.shaking_force.mean(axis=0), axis=1).max()
-        print(f"  shaking force about its mean: {force:.3f} N; power residual {loads.power_residual():.1e}")
+        shaking, frame = (loads.peak(x) for x in ("shaking_force", "frame_force"))
+        print(f"  peak force: shaking {shaking:.3f} N, on the frame {frame:.3f} N")
+        print(f"  power residual {loads.power_residual():.1e}")
         shown.append(viz.Shown(chain, trajectory, loads))
     if not headless:
         viz.view(shown, speed=0.5, title="Solo, feet joined")

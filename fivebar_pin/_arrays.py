@@ -1,4 +1,4 @@
-"""Shared array habits: check once at the boundary, copy in, freeze."""
+"""Shared array habits: check once at the boundary, copy in, freeze; write round-off as what it is."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ import numpy.typing as npt
 from fivebar_pin.errors import InvalidInputError
 
 Array = npt.NDArray[np.float64]
+
+ROUND_OFF = 2.0**-40
+"""Share of what adds up to a number that round-off may leave of it: 4096 units in the last place, as loops are closed
+to some hundred of them and a chain of solved equations adds to that [-]."""
 
 
 def frozen(values: npt.ArrayLike) -> Array:
@@ -82,3 +86,23 @@ def cross(x: Array, y: Array) -> Array:
         ],
         axis=-1,
     )
+
+
+def settled(value: float, scale: float) -> float:
+    """Return a value, zero where it is only the round-off of what adds up to it.
+
+    Args:
+        value: as computed.
+        scale: sum of the sizes of what adds up to it, in its unit; 0 when nothing cancels.
+    """
+    return 0.0 if abs(value) <= ROUND_OFF * scale else float(value)
+
+
+def figures(value: float, scale: float = 0.0, *, digits: int = 4) -> str:
+    """Write a number for people to read, with a few significant digits; round-off is written as 0.
+
+    Args:
+        value, scale: as for `settled`.
+        digits: significant digits.
+    """
+    return f"{settled(value, scale):.{digits}g}"

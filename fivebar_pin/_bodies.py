@@ -101,3 +101,17 @@ def gravity_wrenches(bodies: Bodies, centre: Array, gravity: Array) -> Array:
     """Return the gravity wrench on every body (n, nb, 6)."""
     force = np.broadcast_to(bodies.mass[:, None] * gravity, centre.shape)
     return np.concatenate([force, cross(centre, force)], axis=-1)
+
+
+def sizes(moving: BodyRates, about: Array) -> tuple[Array, Array, Array]:
+    """Return of every body |rate of momentum|, |its moment about the mass centre|, |arm to a point| (n, nb) each."""
+    force, centre = moving.rate[..., :3], moving.centre
+    moment = moving.rate[..., 3:] - cross(centre, force)
+    return tuple(np.linalg.norm(x, axis=2) for x in (force, moment, centre - about))
+
+
+def speeds(tree: Tree, q: Array, centre: Array, N: Array) -> tuple[Array, Array]:
+    """Return the speeds of mass centres and the angular speeds of bodies (n, nb, k) at velocities N (n, nv, k)."""
+    twist = np.einsum("niv,bv,nvk->nbki", tree.poses(q).S, tree.support[1:], N)
+    linear = twist[..., :3] + cross(twist[..., 3:], centre[:, :, None])
+    return np.linalg.norm(linear, axis=3), np.linalg.norm(twist[..., 3:], axis=3)

@@ -21,10 +21,11 @@ class EnergyBalance:
     """Energies [J] and powers [W] along a trajectory, n samples.
 
     Attributes:
-        kinetic: of the bodies, and of the rotors where joints have an armature (n,).
+        kinetic: of the bodies (n,).
+        rotor: kinetic, of the rotors where joints have an armature (n,).
         potential: of gravity, zero at the world origin (n,).
         elastic: stored in springs (n,).
-        kinetic_rate: of the kinetic energy, from the accelerations (n,).
+        kinetic_rate, rotor_rate: of the two, from the accelerations (n,).
         stored_rate: of potential and elastic energy together (n,).
         supplied: by the motors and the forces from outside (n,).
         dissipated: by joint damping, dry friction and the springs' dampers (n,).
@@ -32,9 +33,11 @@ class EnergyBalance:
     """
 
     kinetic: Array
+    rotor: Array
     potential: Array
     elastic: Array
     kinetic_rate: Array
+    rotor_rate: Array
     stored_rate: Array
     supplied: Array
     dissipated: Array
@@ -42,8 +45,8 @@ class EnergyBalance:
 
     @property
     def total(self) -> Array:
-        """Kinetic, potential and elastic energy together (n,) [J]."""
-        return np.asarray(self.kinetic + self.potential + self.elastic)
+        """Kinetic energy of bodies and rotors, potential and elastic energy together (n,) [J]."""
+        return np.asarray(self.kinetic + self.rotor + self.potential + self.elastic)
 
     def drift(self) -> float:
         """Return the largest change of the total energy since the first sample, relative to the energy in play [-].
@@ -52,12 +55,12 @@ class EnergyBalance:
         when nothing is supplied or dissipated.
         """
         stored = self.potential + self.elastic
-        scale = float(self.kinetic.max() + np.ptp(stored))
+        scale = float((self.kinetic + self.rotor).max() + np.ptp(stored))
         return float(np.abs(self.total - self.total[0]).max()) / max(scale, 1e-300)
 
     def residual(self) -> float:
-        """Return the largest mismatch of the rates: kinetic + stored = supplied - dissipated, relative [-]."""
-        mismatch = np.abs(self.kinetic_rate + self.stored_rate - self.supplied + self.dissipated)
+        """Return the largest mismatch of the rates: kinetic + rotor + stored = supplied - dissipated, relative [-]."""
+        mismatch = np.abs(self.kinetic_rate + self.rotor_rate + self.stored_rate - self.supplied + self.dissipated)
         return float(mismatch.max() / max(float(self.exchanged.max()), 1e-300))
 
 
@@ -102,10 +105,12 @@ def energy_balance(
     dissipated = np.sum(system.damping * v * v + system.friction * np.abs(v), axis=1) + sprung.dissipation
     gross = [inertial, heavy, driven, sprung.force * v, dissipated[:, None]]
     return EnergyBalance(
-        kinetic=frozen(0.5 * np.sum(moving.twist * moving.momentum, axis=(1, 2)) + 0.5 * np.sum(rotors * v, axis=1)),
+        kinetic=frozen(0.5 * np.sum(moving.twist * moving.momentum, axis=(1, 2))),
+        rotor=frozen(0.5 * np.sum(rotors * v, axis=1)),
         potential=frozen(-np.einsum("nbi,i,b->n", moving.centre, gravity, bodies.mass)),
         elastic=frozen(sprung.energy),
-        kinetic_rate=frozen(inertial.sum(axis=1) + np.sum(rotors * trajectory.a, axis=1)),
+        kinetic_rate=frozen(inertial.sum(axis=1)),
+        rotor_rate=frozen(np.sum(rotors * trajectory.a, axis=1)),
         stored_rate=frozen(-heavy.sum(axis=1) - np.sum(sprung.force * v, axis=1) - sprung.dissipation),
         supplied=frozen(driven.sum(axis=1)),
         dissipated=frozen(dissipated),

@@ -16,6 +16,8 @@ from fivebar_pin._tree import Poses
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.trajectory import Trajectory
 
+_OPEN = 1e-9  # force in a joint for a unit force in the closures above which the joint's own is not determinate [-]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reactions:
@@ -30,6 +32,10 @@ class Reactions:
         joint_local: `joint` in the axes of the joint, that is of the body it carries.
         bodies: momenta of the bodies and their rates.
         gravity, external, sprung: wrench on every body at the world origin; the last by springs (n, nb, 6).
+        forces: of the joints, then of the closures, of least norm where they are not determinate
+            (n, nb + closures, 3) [N].
+        free: forces that the redundant closures could carry besides, in every joint, then every closure, for a basis
+            of unit closure forces (n, k, nb + closures, 3) [-].
         mismatch: largest unbalanced joint torque [N m or N]; round-off when the trajectory is consistent.
 
     Components that the closures do not determine (they depend on which of the redundant rows carries the load) are
@@ -45,6 +51,8 @@ class Reactions:
     gravity: Array
     external: Array
     sprung: Array
+    forces: Array
+    free: Array
     mismatch: float
 
 
@@ -84,6 +92,8 @@ def reactions(
         gravity,
         applied,
         sprung,
+        np.concatenate([carried, forces.wrench], axis=1)[..., :3],
+        np.concatenate([slack, forces.free], axis=2)[..., :3],
         forces.mismatch,
     )
 
@@ -141,6 +151,16 @@ def _applied(chain: ClosedChain, poses: Poses, external: Mapping[str, Array], sh
     return applied
 
 
+def determinate(free: Array) -> Array:
+    """Return the projections (n, x, 3, 3) of forces onto what redundant closures leave alone.  free (n, k, x, 3)."""
+    n, _, x, _ = free.shape
+    if not free.any():
+        return np.broadcast_to(np.eye(3), (n, x, 3, 3))
+    _, size, axes = np.linalg.svd(np.swapaxes(free, 1, 2), full_matrices=False)
+    lost = axes * (size > _OPEN)[..., None]
+    return np.asarray(np.eye(3) - np.matmul(np.swapaxes(lost, -1, -2), lost))
+
+
 def _carried(chain: ClosedChain, loops: Loops, bodies: Array, closures: Array) -> Array:
     """Return what every joint passes on (..., nb, 6) from what its bodies need and the closures (..., nc, 6) give."""
     needed = np.array(bodies)
@@ -156,7 +176,7 @@ def _seen(wrench: Array, slack: Array, point: Array, axes: Array, unit: Array) -
     at, loose = _at_point(wrench, point), _at_point(slack, point[:, None])
     local, loose_local = _turned(at, axes), _turned(loose, axes[:, None])
     for values, free in ((at, loose), (local, loose_local)):
-        values[np.linalg.norm(free, axis=1) > 1e-9 * unit] = np.nan
+        values[np.linalg.norm(free, axis=1) > _OPEN * unit] = np.nan
     return frozen(at), frozen(local)
 
 

@@ -54,6 +54,8 @@ def direct(chain: fb.ClosedChain, trajectory: fb.Trajectory) -> dict[str, np.nda
         "angular_momentum": momentum[:, 3:] - np.cross(ABOUT, momentum[:, :3]),
         "shaking_force": loads.shaking_force,
         "shaking_moment": loads.shaking_moment,
+        "frame_force": loads.frame_force,
+        "frame_moment": loads.frame_moment,
         "torque": loads.torque,
         "gravity_torque": inverse_dynamics(chain, at_rest).torque,
         "potential_energy": loads.potential_energy[:, None],
@@ -101,3 +103,18 @@ def test_parameters_of_the_wrong_shape_are_refused() -> None:
     chain, trajectory = driven("four_bar")
     with pytest.raises(fb.errors.InvalidInputError, match="shape of parameters"):
         regressor(chain, trajectory, "torque")(np.zeros((2, 10)))
+
+
+@pytest.mark.parametrize("name", ["five_bar", "rssr"])
+def test_shaking_rows_know_no_gravity_and_frame_rows_no_more_than_the_weight(name: str) -> None:
+    chain, trajectory = driven(name)
+    light = chain.with_gravity((0.0, 0.0, 0.0))
+    for part in ("force", "moment"):
+        shaking = regressor(chain, trajectory, f"shaking_{part}", about=ABOUT).matrix
+        np.testing.assert_array_equal(shaking, regressor(light, trajectory, f"shaking_{part}", about=ABOUT).matrix)
+        np.testing.assert_array_equal(shaking, regressor(light, trajectory, f"frame_{part}", about=ABOUT).matrix)
+    weight = chain.mass * chain.model.gravity.linear
+    frame, shaking = (
+        regressor(chain, trajectory, f"{x}_force")(chain.inertial_parameters) for x in ("frame", "shaking")
+    )
+    np.testing.assert_allclose(frame - shaking, np.tile(weight, (len(frame), 1)), rtol=0, atol=1e-12)

@@ -11,6 +11,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.cli import main
+from fivebar_pin.cli._moving import moved
 
 
 @pytest.fixture(scope="module")
@@ -225,3 +226,48 @@ def test_pareto_writes_the_front(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert np.all(np.diff(front[:, 0]) > 0.0) and np.all(np.diff(front[:, 1]) < 0.0)
     assert main([*words, "--out", str(file)]) == 1
     assert "exists already" in capsys.readouterr().err
+
+
+def _cells(said: str, name: str) -> list[str]:
+    """Return the numbers of a table row."""
+    return next(line for line in said.splitlines() if line.strip().startswith(name)).split()[-4:]
+
+
+def test_balance_shows_what_shakes_beside_what_the_frame_carries(capsys: pytest.CaptureFixture[str]) -> None:
+    """Under gravity: 0 shakes after, the frame carries the weight; with one motor the RMS is rms_torque."""
+    assert main(["balance", "four_bar_crank_rocker"]) == 0
+    said = capsys.readouterr().out
+    assert _cells(said, "shaking force [N]")[2:] == ["0", "0"]
+    design = fb.balance(
+        fb.load(fb.io.shipped_path("four_bar_crank_rocker")),
+        "force",
+        motions=moved(fb.load(fb.io.shipped_path("four_bar_crank_rocker")), None),
+    )
+    wanted = [design.before["peak_frame_force"], design.before["rms_frame_force"]]
+    assert _cells(said, "frame force [N]")[:2] == [f"{x:.4g}" for x in wanted]
+    assert _cells(said, "frame force [N]")[2:] == [f"{9.81 * design.chain.mass:.4g}"] * 2
+    assert _cells(said, "drive at crank [N m]")[3] == f"{design.after['rms_torque']:.4g}"
+    assert "left out" not in said
+
+
+def test_what_is_balanced_reads_as_zero_and_is_written_with_every_digit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["balance", "four_bar_crank_rocker", "--out", str(tmp_path / "o")]) == 0
+    capsys.readouterr()
+    file = tmp_path / "o" / "four_bar_crank_rocker_balanced.urdf"
+    assert main(["loads", str(file), "--out", str(tmp_path / "l")]) == 0
+    said = capsys.readouterr().out
+    assert _cells(said, "shaking force [N]")[-2:] == ["0", "0"]
+    assert _cells(said, "travel of the mass centre [m]")[-1] == "0"
+    assert float(_cells(said, "closure residual [m or rad]")[-1]) > 0.0  # an accuracy stays what it is
+    header = (tmp_path / "l" / "loads.csv").read_text().splitlines()[0].split(",")
+    data = dict(zip(header, np.loadtxt(tmp_path / "l" / "loads.csv", delimiter=",", skiprows=1).T, strict=True))
+    assert 0.0 < np.abs(data["F x [N]"]).max() < 1e-14
+    np.testing.assert_allclose(data["frame F y [N]"], -9.81 * fb.load(file).mass, rtol=1e-12)
+    page = (tmp_path / "l" / "animation.html").read_text(encoding="utf-8")
+    assert '"text": "frame force"' in page and "no arrow: the shaking force is zero to round-off" in page
+    assert main(["conditions", str(file)]) == 0
+    assert "as it is: 0 kg" in capsys.readouterr().out
+    assert main(["loads", "five_bar_case_I"]) == 0
+    assert "frame force" not in capsys.readouterr().out  # no weight, nothing to tell apart

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -130,8 +131,7 @@ def test_work_of_the_motors_is_the_gain_of_energy(case):
     b, f = np.array(chain.model.damping), np.array(chain.model.upperDryFrictionLimit)
     lost = np.sum((b * v + f * np.sign(v)) * v, axis=1)
     work = float(0.15 * w @ (supplied - lost)[1:-1])
-    armature = 0.5 * np.sum(np.array(chain.model.armature) * v * v, axis=1)
-    energy = loads.kinetic_energy + loads.potential_energy + armature
+    energy = loads.kinetic_energy + loads.rotor_energy + loads.potential_energy
     scale = float(np.abs(energy - energy[0]).max())
     tolerance = 1e-3 if np.any(f) else 1e-9  # dry friction has a kink where a joint turns back
     assert work == pytest.approx(energy[-1] - energy[0], abs=tolerance * scale)
@@ -147,11 +147,13 @@ def test_energies_are_pinocchios(loads, case):
         kinetic = pin.computeKineticEnergy(model, data, trajectory.q[i], trajectory.v[i])
         potential = pin.computePotentialEnergy(model, data, trajectory.q[i])
         assert loads[case].kinetic_energy[i] == pytest.approx(kinetic, rel=1e-12)
+        rotors = pin.computeKineticEnergy(chain.model, data, trajectory.q[i], trajectory.v[i]) - kinetic
+        assert loads[case].rotor_energy[i] == pytest.approx(rotors, rel=1e-9, abs=1e-12)
         assert loads[case].potential_energy[i] == pytest.approx(potential, rel=1e-12, abs=1e-12)
 
 
 @EACH
-def test_shaking_wrench_is_gravity_minus_the_rate_of_momentum(loads, case):
+def test_shaking_wrench_is_minus_the_rate_of_momentum_and_the_frame_carries_the_weight_besides(loads, case):
     chain, trajectory = simple(loads[case])
     assert loads[case].momentum_residual() <= 1e-12
     model, g = chain.model, np.array(chain.model.gravity.linear)
@@ -161,12 +163,16 @@ def test_shaking_wrench_is_gravity_minus_the_rate_of_momentum(loads, case):
             model, data, trajectory.q[i], trajectory.v[i], trajectory.a[i]
         )
         com, scale = data.com[0], 1.0 + float(np.abs(rate.vector).max())
-        force = chain.mass * g - rate.linear
         arm = com - loads[case].about
-        moment = np.cross(arm, force) - rate.angular
+        moment = -rate.angular - np.cross(arm, rate.linear)
         np.testing.assert_allclose(loads[case].com[i], com, rtol=0.0, atol=1e-13)
-        np.testing.assert_allclose(loads[case].shaking_force[i], force, rtol=0.0, atol=1e-12 * scale)
+        np.testing.assert_allclose(loads[case].shaking_force[i], -rate.linear, rtol=0.0, atol=1e-12 * scale)
         np.testing.assert_allclose(loads[case].shaking_moment[i], moment, rtol=0.0, atol=1e-12 * scale)
+        weight = chain.mass * g
+        np.testing.assert_allclose(loads[case].frame_force[i], weight - rate.linear, rtol=0.0, atol=1e-12 * scale)
+        np.testing.assert_allclose(
+            loads[case].frame_moment[i], moment + np.cross(arm, weight), rtol=0.0, atol=1e-12 * scale
+        )
 
 
 @EACH
@@ -188,10 +194,10 @@ def test_torque_satisfies_the_equations_of_motion(loads, case):
 
 
 @EACH
-def test_forces_of_ground_joints_and_closures_add_up_to_the_shaking_force(loads, case):
+def test_forces_of_ground_joints_and_closures_add_up_to_the_frame_force(loads, case):
     x = loads[case]
     chain = x.chain
-    total = np.zeros_like(x.shaking_force)
+    total = np.zeros_like(x.frame_force)
     for j in range(1, chain.model.njoints):
         if chain.model.parents[j] == 0:
             total -= x.joint_reactions[:, j - 1, :3]
@@ -200,8 +206,8 @@ def test_forces_of_ground_joints_and_closures_add_up_to_the_shaking_force(loads,
             sign = -1.0 if anchored.joints[0] == 0 else 1.0
             total += sign * x.closure_reactions[:, k, :3]
     known = np.isfinite(total)
-    scale = 1.0 + np.abs(x.shaking_force).max()
-    np.testing.assert_allclose(total[known], x.shaking_force[known], rtol=0.0, atol=1e-11 * scale)
+    scale = 1.0 + np.abs(x.frame_force).max()
+    np.testing.assert_allclose(total[known], x.frame_force[known], rtol=0.0, atol=1e-11 * scale)
     if case in ("five-bar", "RSSR", "RSCR", "double four-bar"):
         assert known.any()
 
@@ -243,12 +249,25 @@ def test_closed_and_open_cut_give_the_same_reactions():
     a = fb.inverse_dynamics(cut, fb.drive(cut, motion, q))
     b = fb.inverse_dynamics(same, fb.drive(same, motion, near))
     np.testing.assert_allclose(a.torque, b.torque, rtol=0.0, atol=1e-11)
-    np.testing.assert_allclose(a.shaking_force, b.shaking_force, rtol=0.0, atol=1e-11)
-    np.testing.assert_allclose(a.shaking_moment, b.shaking_moment, rtol=0.0, atol=1e-11)
+    for name in ("shaking_force", "shaking_moment", "frame_force", "frame_moment"):
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0.0, atol=1e-11)
     for k in (0, 1):
         np.testing.assert_allclose(a.joint_reactions[:, k, :2], b.joint_reactions[:, k, :2], rtol=0.0, atol=1e-10)
     # The force by the coupler on the rocker: closure of one, joint of the other.
     np.testing.assert_allclose(a.closure_reactions[:, 0, :2], b.joint_reactions[:, 2, :2], rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("swapped", ["shaking_force", "shaking_moment", "frame_force", "frame_moment"])
+def test_momentum_residual_tells_when_a_wrench_is_not_what_its_name_says(loads, swapped):
+    x = loads["RSSR"]
+    other = swapped.replace("shaking", "frame") if "shaking" in swapped else swapped.replace("frame", "shaking")
+    x = replace(x, external={x.chain.closures[0].frames[0]: np.tile([3.0, 1.0, 2.0, 0.5, 0.2, 0.1], (40, 1))})
+    assert replace(loads["RSSR"]).momentum_residual() <= 1e-12
+    assert x.momentum_residual() > 1e-3  # a force that the frame does not carry
+    assert replace(loads["RSSR"], **{swapped: getattr(loads["RSSR"], swapped) + 1e-3}).momentum_residual() > 1e-6
+    heavy = five_bar()
+    y = fb.inverse_dynamics(heavy, fb.drive(heavy, swinging(2.0, 1.0)))
+    assert replace(y, **{swapped: getattr(y, other)}).momentum_residual() > 1e-3
 
 
 def test_moment_about_another_point_shifts_with_the_force():
@@ -258,7 +277,10 @@ def test_moment_about_another_point_shifts_with_the_force():
     b = fb.inverse_dynamics(chain, trajectory, about=(0.7, -0.3, 1.1))
     shifted = a.shaking_moment - np.cross([0.7, -0.3, 1.1], a.shaking_force)
     np.testing.assert_allclose(b.shaking_moment, shifted, rtol=0.0, atol=1e-12 * np.abs(a.shaking_moment).max())
+    shifted = a.frame_moment - np.cross([0.7, -0.3, 1.1], a.frame_force)
+    np.testing.assert_allclose(b.frame_moment, shifted, rtol=0.0, atol=1e-12 * np.abs(a.frame_moment).max())
     np.testing.assert_array_equal(a.shaking_force, b.shaking_force)
+    np.testing.assert_array_equal(a.frame_force, b.frame_force)
     np.testing.assert_array_equal(a.torque, b.torque)
 
 
@@ -281,11 +303,14 @@ def test_gravity_as_external_forces_changes_nothing(build):
         for j in range(1, model.njoints)
     }
     outside = fb.inverse_dynamics(free, trajectory, external=weights)
-    for name in ("torque", "shaking_force", "shaking_moment", "joint_reactions", "closure_reactions"):
+    for name in ("shaking_force", "shaking_moment"):
+        same = 1e-14 * inside.scale(name)
+        np.testing.assert_allclose(getattr(inside, name), getattr(outside, name), rtol=0.0, atol=same)
+    for name in ("torque", "frame_force", "frame_moment", "joint_reactions", "closure_reactions"):
         a, b = getattr(inside, name), getattr(outside, name)
         np.testing.assert_array_equal(np.isnan(a), np.isnan(b))
         a, b = np.nan_to_num(a), np.nan_to_num(b)
-        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-11 * np.abs(inside.shaking_force).max())
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-11 * np.abs(inside.frame_force).max())
     assert outside.power_residual() <= 1e-12
     assert outside.momentum_residual() <= 1e-12
 
@@ -302,7 +327,9 @@ def test_external_wrench_enters_by_virtual_work():
         J = pin.computeFrameJacobian(chain.model, data, trajectory.q[i], fid, pin.LOCAL_WORLD_ALIGNED)
         work = trajectory.N[i].T @ J.T @ wrench[i]
         np.testing.assert_allclose(bare.torque[i] - loaded.torque[i], work, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(loaded.shaking_force - bare.shaking_force, wrench[:, :3], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(loaded.frame_force - bare.frame_force, wrench[:, :3], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(loaded.shaking_force, bare.shaking_force, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(loaded.shaking_moment, bare.shaking_moment, rtol=0.0, atol=1e-14)
     assert loaded.power_residual() <= 1e-12
     assert loaded.momentum_residual() <= 1e-12
 
@@ -313,7 +340,9 @@ def test_wrench_on_the_ground_only_reaches_the_ground():
     bare = fb.inverse_dynamics(chain, trajectory)
     loaded = fb.inverse_dynamics(chain, trajectory, external={"universe": [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]})
     np.testing.assert_array_equal(loaded.torque, bare.torque)
-    np.testing.assert_allclose(loaded.shaking_force - bare.shaking_force, [[1.0, 2.0, 3.0]] * 40, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(loaded.frame_force - bare.frame_force, [[1.0, 2.0, 3.0]] * 40, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(loaded.shaking_force, bare.shaking_force, rtol=0.0, atol=1e-14)
+    assert loaded.momentum_residual() <= 1e-12
 
 
 def test_damping_friction_and_armature_do_what_their_names_say():
@@ -343,9 +372,11 @@ def test_at_rest_without_gravity_nothing_is_felt_and_weight_is_weight():
     assert np.abs(loads.torque).max() == 0.0
     assert np.abs(loads.shaking_force).max() == 0.0
     heavy = fb.inverse_dynamics(chain.with_gravity([1.0, -2.0, 3.0]), loads.trajectory)
-    np.testing.assert_allclose(
-        heavy.shaking_force, np.tile(chain.mass * np.array([1.0, -2.0, 3.0]), (2, 1)), rtol=0.0, atol=1e-13
-    )
+    weight = chain.mass * np.array([1.0, -2.0, 3.0])
+    np.testing.assert_allclose(heavy.frame_force, np.tile(weight, (2, 1)), rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(heavy.frame_moment, np.cross(heavy.com, weight), rtol=0.0, atol=1e-13)
+    assert not heavy.shaking_force.any() and not heavy.shaking_moment.any()
+    assert heavy.loaded and not loads.loaded
 
 
 def test_torques_and_forces_grow_with_the_square_of_the_speed():
@@ -389,10 +420,75 @@ def test_open_tree_has_the_torques_of_pinocchio():
 def test_results_are_read_only_and_print_their_peaks():
     chain = five_bar()
     loads = fb.inverse_dynamics(chain, fb.drive(chain, swinging(2.0, 1.0)))
-    for name in ("torque", "shaking_force", "shaking_moment", "com", "joint_reactions", "kinetic_energy"):
+    names = ("torque", "shaking_force", "shaking_moment", "frame_force", "frame_moment", "com", "joint_reactions")
+    for name in (*names, "kinetic_energy", "rotor_energy"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(loads, name)[...] = 0.0
     assert repr(loads).startswith("Loads(40 samples; peaks: torque ")
+    assert f"shaking_force {np.linalg.norm(loads.shaking_force, axis=1).max():.4g}" in repr(loads)
+    assert f"frame_force {np.linalg.norm(loads.frame_force, axis=1).max():.4g}" in repr(loads)
+    with pytest.raises(UnknownNameError, match="quantity 'weight'; known: torque, shaking_force"):
+        loads.scale("weight")
+
+
+@EACH
+def test_energies_have_one_value_under_one_name(loads, case):
+    """What the loads call kinetic and rotor energy is what the energy balance calls so."""
+    x = loads[case]
+    account = fb.energy_balance(x.chain, x.trajectory, torque=x.torque)
+    for mine, other in (
+        (x.kinetic_energy, account.kinetic),
+        (x.rotor_energy, account.rotor),
+        (x.potential_energy, account.potential),
+        (x.elastic_energy, account.elastic),
+    ):
+        np.testing.assert_allclose(mine, other, rtol=1e-13, atol=1e-13)
+    assert account.residual() <= 1e-12
+    np.testing.assert_allclose(account.total, account.kinetic + account.rotor + account.potential, rtol=1e-14)
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, 0.0), (3.0, -9.81, 4.0), (0.0, -1e6, 0.0)])
+def test_a_balanced_five_bar_does_not_shake_by_the_digits_of_its_weight(gravity):
+    """The shaking wrench is the same under any gravity, to the round-off of inertia; the frame carries the weight."""
+    linkage, motion = paper.balance(paper.table_1("I", "balanced")).linkage, paper.default_motion(samples=101)
+    light, heavy = linkage.chain(), linkage.chain(gravity=gravity)
+    trajectory = fb.drive(light, motion, linkage.configuration(*motion.q[0]))
+    bare, loads = fb.inverse_dynamics(light, trajectory), fb.inverse_dynamics(heavy, trajectory)
+    assert np.abs(loads.shaking_force).max() <= 1e-15
+    np.testing.assert_allclose(loads.shaking_moment, bare.shaking_moment, rtol=0.0, atol=1e-15)
+    weight = light.mass * np.array(gravity)
+    np.testing.assert_allclose(
+        loads.frame_force, np.tile(weight, (101, 1)), rtol=0.0, atol=1e-15 + 1e-14 * max(map(abs, weight))
+    )
+
+
+@EACH
+def test_bearing_forces_are_the_determinate_part_of_the_reactions(loads, case):
+    """Where nothing is open they are the reactions; in a plane, however it lies, what is known in the joint's axes."""
+    x = loads[case]
+    nb = len(x.chain.joints)
+    assert x.bearing_force.shape == (len(x.trajectory), nb + len(x.chain.closures), 3)
+    world = np.concatenate([x.joint_reactions, x.closure_reactions], axis=1)[..., :3]
+    local = np.concatenate([x.joint_reactions_local, x.closure_reactions_local], axis=1)[..., :3]
+    known = np.isfinite(world)
+    scale = np.nanmax(np.abs(local), initial=1.0)
+    np.testing.assert_allclose(x.bearing_force[known], world[known], rtol=0.0, atol=1e-11 * scale)
+    if case != "Bennett":  # nothing is known there in any axes
+        joints = slice(0, nb)
+        size = np.linalg.norm(np.nan_to_num(local[:, joints]), axis=2)
+        found = np.linalg.norm(x.bearing_force[:, joints], axis=2)
+        np.testing.assert_allclose(found, size, rtol=0.0, atol=1e-11 * scale)
+
+
+@EACH
+def test_scales_bound_their_quantities_and_tell_round_off_from_results(loads, case):
+    """No value is larger than the sum of sizes it is made of; a sum much larger than its value means cancellation."""
+    x = loads[case]
+    for name in ("torque", "shaking_force", "shaking_moment", "frame_force", "frame_moment"):
+        values = np.abs(x.torque) if name == "torque" else np.linalg.norm(getattr(x, name), axis=1)
+        assert x.peak(name) == values.max() <= x.scale(name) * (1.0 + 1e-12)
+        assert x.scale(name) <= 1e3 * values.max()
+    assert x.peak("travel") == np.linalg.norm(x.com - x.com[0], axis=1).max() <= 2.0 * x.scale("travel")
 
 
 def test_arguments_are_checked():

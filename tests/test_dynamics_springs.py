@@ -87,6 +87,8 @@ def test_springs_leave_the_force_on_the_frame_and_balance_every_body(chain, moti
     loads, bare = fb.inverse_dynamics(chain, moved, springs=springs), fb.inverse_dynamics(chain, moved)
     np.testing.assert_array_equal(loads.shaking_force, bare.shaking_force)
     np.testing.assert_array_equal(loads.shaking_moment, bare.shaking_moment)
+    np.testing.assert_array_equal(loads.frame_force, bare.frame_force)
+    np.testing.assert_array_equal(loads.frame_moment, bare.frame_moment)
     assert loads.momentum_residual() < 1e-12
     assert loads.reactions.mismatch < 1e-9
     assert np.nanmax(np.abs(loads.joint_reactions_local - bare.joint_reactions_local)) > 0.1

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from paper_cases import states
 
+import fivebar_pin as fb
 from fivebar_pin import paper
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError, UnknownNameError
 from fivebar_pin.motion import Motion
@@ -54,10 +55,9 @@ def pinocchio_road(linkage, s, gravity):
         com.append(pin.centerOfMass(model, data, q, v, a).copy())
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
         m = pin.computeTotalMass(model)
-        force = -data.dhg.linear + m * g
-        wrench.append([*force, *(-data.dhg.angular + np.cross(com[-1], force))])
-    wrench = np.array(wrench)
-    return np.array(torque), wrench[:, :3], wrench[:, 3:], np.array(com)
+        moment = -data.dhg.angular - np.cross(com[-1], data.dhg.linear)
+        wrench.append([-data.dhg.linear, moment, m * g - data.dhg.linear, moment + np.cross(com[-1], m * g)])
+    return np.array(torque), *np.swapaxes(wrench, 0, 1), np.array(com)
 
 
 @settings(max_examples=120, deadline=None)
@@ -70,11 +70,13 @@ def test_closed_form_equals_pinocchio_on_random_linkages(state):
     reached = linkage.lengths[0] * np.exp(1j * q[0, 0]) + linkage.lengths[1] * np.exp(1j * s.theta[0])
     assert abs(reached - O3) <= 1e-12 * size
     assert s.closure_residual[0] <= 1e-13 * size
-    torque, force, moment, com = pinocchio_road(linkage, s, GRAVITY)
-    weight = np.abs(s.joint_forces).max() + np.abs(force).max()
+    torque, force, moment, frame_force, frame_moment, com = pinocchio_road(linkage, s, GRAVITY)
+    weight = np.abs(s.joint_forces).max() + np.abs(frame_force).max()
     np.testing.assert_allclose(s.torque, torque, rtol=0, atol=1e-11 * weight * size)
     np.testing.assert_allclose(s.shaking_force, force, rtol=0, atol=1e-11 * weight)
     np.testing.assert_allclose(s.shaking_moment, moment, rtol=0, atol=1e-11 * weight * size)
+    np.testing.assert_allclose(s.frame_force, frame_force, rtol=0, atol=1e-11 * weight)
+    np.testing.assert_allclose(s.frame_moment, frame_moment, rtol=0, atol=1e-11 * weight * size)
     np.testing.assert_allclose(s.com, com, rtol=0, atol=1e-13 * size)
 
 
@@ -154,8 +156,9 @@ def test_gravity_alone_loads_a_linkage_at_rest():
     q = np.array([[0.4, 1.3]])
     s = paper.solve_states(linkage, q, zero, zero, gravity=GRAVITY)
     weight = linkage.masses.sum() * np.array(GRAVITY)
-    np.testing.assert_allclose(s.shaking_force[0], weight, rtol=1e-13)
-    np.testing.assert_allclose(s.shaking_moment[0], np.cross(s.com[0], weight), atol=1e-14)
+    np.testing.assert_allclose(s.frame_force[0], weight, rtol=1e-13)
+    np.testing.assert_allclose(s.frame_moment[0], np.cross(s.com[0], weight), atol=1e-14)
+    assert not s.shaking_force.any() and not s.shaking_moment.any()
     for k in range(2):
         h = np.eye(2)[k] * 1e-6
         up, down = (paper.solve_states(linkage, q + x, zero, zero).com[0] for x in (h, -h))
@@ -165,7 +168,8 @@ def test_gravity_alone_loads_a_linkage_at_rest():
 def test_results_are_read_only():
     """Nothing can be written into a solution."""
     s = paper.solve(paper.table_1("I", "unbalanced"), paper.default_motion(samples=5))
-    for name in ("angles", "rates", "accelerations", "partials", "torque", "joint_forces", "shaking_force", "com"):
+    names = ("angles", "rates", "accelerations", "partials", "torque", "joint_forces", "shaking_force", "frame_force")
+    for name in (*names, "com"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(s, name)[0] = 0.0
     assert repr(s) == "Solution(5 samples, left mode)"
@@ -241,3 +245,14 @@ def test_input_of_the_wrong_form_is_refused():
         paper.solve(linkage, motion, gravity=9.81)
     with pytest.raises(InvalidInputError, match="shape of v"):
         paper.solve_states(linkage, motion.q, motion.v[:2], motion.a)
+
+
+def test_closure_residual_is_the_one_of_the_chain():
+    """Opened on purpose, the loop is as far open as the chain's own residual says, component by component."""
+    linkage = paper.table_1("I", "unbalanced")
+    s = paper.solve(linkage, paper.default_motion(samples=7))
+    wrong = replace(s, angles=s.angles + np.array([0.01, -0.02, 0.03, 0.0]))
+    rows = [fb.closure_residual(linkage.chain(), q) for q in wrong.trajectory.q]
+    expected = np.abs(rows).max(axis=1)
+    assert expected.min() > 1e-4
+    np.testing.assert_allclose(wrong.closure_residual, expected, rtol=1e-12)

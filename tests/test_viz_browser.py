@@ -238,3 +238,24 @@ def test_live_page_follows_the_server(browser: Window, pair: list[viz.Shown]) ->
         browser.until("document.querySelector('.label b')?.textContent === 'balanced'")
         assert browser.errors == []
         browser.page.goto("about:blank")
+
+
+def test_the_frame_force_is_told_beside_the_shaking_force_where_gravity_acts(
+    browser: Window, tmp_path: Path, pair: list[viz.Shown]
+) -> None:
+    """A balanced linkage under gravity: 0 N shake it, the frame carries the weight; without gravity one line."""
+    linkage, motion = balanced_case_I(), paper.default_motion(samples=11)
+    chain = linkage.chain(gravity=(0.0, -9.81, 0.0))
+    trajectory = fb.drive(chain, motion, near=linkage.configuration(*motion.q[0]))
+    heavy = viz.Shown(chain, trajectory, fb.inverse_dynamics(chain, trajectory), "heavy")
+    browser.open(viz.html(tmp_path / "heavy.html", [heavy]).as_uri())
+    browser.until("document.querySelector('.label span').textContent !== ''")
+    text = "() => document.querySelector('.label span').textContent"
+    weight = 9.81 * chain.mass
+    assert browser.page.evaluate(text).split("\n") == [
+        "shaking force 0.00 N, peak 0.00 N",
+        f"frame force {weight:.2f} N, peak {weight:.2f} N",
+    ]
+    browser.open(viz.html(tmp_path / "light.html", pair[:1]).as_uri())
+    browser.until("document.querySelector('.label span').textContent !== ''")
+    assert browser.page.evaluate(text).count("force") == 1

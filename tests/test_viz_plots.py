@@ -129,3 +129,16 @@ def test_wrong_input_is_named(loads: dict[str, fb.Loads]) -> None:
         plots.torques(loads, ("psi", "gamma"), t=T[:-1])
     with pytest.raises(InvalidInputError, match="at least one"):
         plots.shaking({}, t=T)
+
+
+def test_a_balanced_mechanism_travels_nowhere_and_its_axis_is_not_blown_up() -> None:
+    """Round-off is no travel in the legend and no curve on a magnified axis; the weight shows in the frame's plot."""
+    linkage = paper.balance(paper.table_1("I", "balanced")).linkage
+    chain, motion = linkage.chain(gravity=(0.0, -9.81, 0.0)), paper.default_motion(samples=31)
+    one = {"b": fb.inverse_dynamics(chain, fb.drive(chain, motion, near=linkage.configuration(*motion.q[0])))}
+    assert plots.com(one).axes[0].lines[0].get_label() == "b: travel 0 mm"
+    shaking, frame = plots.shaking(one, t=T), plots.frame(one, t=T)
+    assert [ax.get_ylabel() for ax in shaking.axes] == ["shaking force x [N]", "shaking moment z [N m]"]
+    assert shaking.axes[0].get_ylim() == (-1.0, 1.0)
+    assert [ax.get_ylabel() for ax in frame.axes] == ["frame force y [N]", "frame moment z [N m]"]
+    assert np.array_equal(frame.axes[0].lines[0].get_ydata(), one["b"].frame_force[:, 1])

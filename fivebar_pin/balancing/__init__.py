@@ -8,7 +8,8 @@
 moment m c and inertia about the joint origin, in one vector pi. Along any motion q(t) of the closed chain
 
     linear momentum p = Y_p(q, v) pi,       angular momentum L = Y_L(q, v) pi,
-    force and moment on the frame           F = -dp/dt + m g = Y_F(q, v, a) pi,     M = Y_M(q, v, a) pi,
+    shaking force and moment                F = -dp/dt = Y_F(q, v, a) pi,     M = -dL/dt = Y_M(q, v, a) pi,
+    frame force and moment                  the same with the weight,
     motor torque                            tau = N^T Y_t(q, v, a) pi + (friction, rotors),
 
 and so are joint reactions and energies: none of these matrices knows the masses (`regressor`). N is the complement,

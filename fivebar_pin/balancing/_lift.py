@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing._material import Material
-from fivebar_pin.balancing._parameters import from_pseudo_inertia, pseudo_inertia
+from fivebar_pin.balancing._parameters import Space, from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.balancing.design import Change, change_of
+from fivebar_pin.chain import ClosedChain
 
 if TYPE_CHECKING:
     from fivebar_pin.balancing.problem import BalanceProblem
@@ -37,7 +39,7 @@ def lift(problem: BalanceProblem, y: Array) -> Lifted:
     lowest = np.inf
     pieces: dict[int, list[Change]] = {1: [], -1: []}
     for m in problem.materials:
-        ten = _ten(problem, m, y[m.start : m.start + m.size])
+        ten = _ten(problem.chain, problem.space, problem.mass, m, y[m.start : m.start + m.size])
         lowest = min(lowest, lowest_eigenvalue(ten, planar=False))
         pieces[m.sign].append(change_of(joints[m.body], ten))
         if m.sign < 0:
@@ -60,11 +62,23 @@ def height_of(chain_parameters: Array, normal: Array) -> float:
     return float(normal @ chain_parameters[1:4]) / mass if mass > 0.0 else 0.0
 
 
-def _ten(problem: BalanceProblem, m: Material, z: Array) -> Array:
+def linear(chain: ClosedChain, space: Space, mass: float, materials: Sequence[Material]) -> Array:
+    """Return E (10 nb, n): what variables of all materials change in the ten parameters of all bodies, SI units.
+
+    What `lift` makes of planar variables is linear in them but for the share of second moments between the directions
+    of the plane, which planar motion does not feel.
+    """
+    E = np.zeros((10 * len(chain.joints), sum(m.size for m in materials)))
+    for m in materials:
+        for k, unit in enumerate(np.eye(m.size)):
+            E[10 * m.body : 10 * m.body + 10, m.start + k] = m.sign * _ten(chain, space, mass, m, unit)
+    return E
+
+
+def _ten(chain: ClosedChain, space: Space, mass: float, m: Material, z: Array) -> Array:
     """Return the ten parameters of a piece, SI units."""
-    space, turn = problem.space, np.eye(4)
-    axes = np.array(space.axes[m.body])
+    turn, axes = np.eye(4), np.array(space.axes[m.body])
     turn[:3, :3] = space.length * axes.T
-    height = height_of(problem.chain.inertial_parameters[m.body], axes[2]) / space.length
-    P = problem.mass * m.pseudo_inertia(z, height)
+    height = height_of(chain.inertial_parameters[m.body], axes[2]) / space.length
+    P = mass * m.pseudo_inertia(z, height)
     return np.asarray(from_pseudo_inertia(turn @ P @ turn.T))

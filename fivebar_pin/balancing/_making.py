@@ -112,8 +112,9 @@ class Maker:
         )
 
     def _settle(self, design: Design) -> tuple[Design, bool]:
-        """Follow size, place and arms until they stay; return the last design and whether they do."""
+        """Follow size, place and arms until they stay; return the last design and whether it can be made."""
         carried = np.zeros((len(self.chain.joints), 10))
+        whole = still = False
         for step in range(_STEPS):
             arms = self.arms(design)
             whole_way = step < _EAGER or self._moved(arms, design.arms) < _NEAR * self.chain.length
@@ -129,7 +130,7 @@ class Maker:
             design = replace(following, arms=arms)
             if whole and still and settled:
                 return design, True
-        return design, False
+        return design, whole and still  # it can be made as it is; its gap says how much better another might be
 
     def _toward(self, design: Design, now: Array, arms: Array, parts: Sequence[float]) -> tuple[Design, Array]:
         """Return the next design with the arms asked for, or as far on the way there as there is a design."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -54,13 +55,14 @@ class TermMaker:
                 weight = reflected_inertia(self.chain, self.paths)
             now = float(weight @ present)
             constant = float(weight @ self.pi0) - (now if name == "added_mass" else 0.0)
-            return linear_term(name, weight @ self.full_E, constant, abs(now) or 1.0)
+            measured = partial(_weighed, weight, now if name == "added_mass" else 0.0)
+            return linear_term(name, weight @ self.full_E, constant, abs(now) or 1.0, measured)
         if name == "distance":
             X = self.setup.space.of(self.chain.inertial_parameters).reshape(-1) / self.setup.unit
-            return Term(name, ((self.E, self.X0 - X),), False, 1.0)
-        measured = measure_of(name)
-        assert measured is not None
-        return rows_term(name, self.rows[measured], self.full_E, self.pi0, present)
+            return Term(name, ((self.E, self.X0 - X),), False, 1.0, partial(_distance, self.setup))
+        quantity = measure_of(name)
+        assert quantity is not None
+        return rows_term(name, self.rows[quantity], self.full_E, self.pi0, present)
 
     def limits(self, limits: Mapping[str, npt.ArrayLike]) -> list[Block]:
         """Return the cones of all upper bounds."""
@@ -73,6 +75,15 @@ class TermMaker:
                 root = np.sqrt(limit) if name.startswith("mean_square_") else limit
                 blocks += self.make(base(name)).bounded(float(root))
         return blocks
+
+
+def _weighed(weight: Array, now: float, pi: Array) -> float:
+    return float(weight @ pi.reshape(-1)) - now
+
+
+def _distance(setup: Setup, pi: Array) -> float:
+    away = setup.space.of(pi - setup.chain.inertial_parameters).reshape(-1) / setup.unit
+    return float(np.linalg.norm(away))
 
 
 def weights_of(minimise: str | Mapping[str, float] | None, mode: str) -> dict[str, float]:

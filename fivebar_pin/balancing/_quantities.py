@@ -8,18 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._parameters import plane_axes
+from fivebar_pin._arrays import ROUND_OFF, Array
+from fivebar_pin._reactions import determinate
 from fivebar_pin.balancing._reaction_rows import reactions
 from fivebar_pin.balancing.regressors import regressor
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.kinematics import drive
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
 Motions = Motion | Trajectory | Sequence[Motion | Trajectory]
-MEASURES = ("torque", "shaking_force", "shaking_moment", "bearing_force", "angular_momentum")
+MEASURES = (
+    "torque",
+    "shaking_force",
+    "shaking_moment",
+    "frame_force",
+    "frame_moment",
+    "bearing_force",
+    "angular_momentum",
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +59,22 @@ class Rows:
 
     def peak(self, pi: Array) -> float:
         """Return the largest length of a group over all samples."""
-        values = self.values(pi)
+        return self._longest(self.values(pi))
+
+    def scale(self, term: str, pi: Array) -> float:
+        """Return the sum of the sizes of what adds up to a term of this quantity, see `Loads.scale`.
+
+        Args:
+            term: rms_, peak_ or mean_square_ of the quantity; a mean square is round-off when its root is.
+            pi: parameters (nb, 10).
+        """
+        sizes = np.abs(self.F) @ np.abs(pi.reshape(-1)) + np.abs(self.f)
+        if term.startswith("peak_"):
+            return self._longest(sizes)
+        rms = float(np.sqrt(np.mean(np.sum(sizes**2, axis=1))))
+        return ROUND_OFF * rms * rms if term.startswith("mean_square_") else rms
+
+    def _longest(self, values: Array) -> float:
         return max((float(np.linalg.norm(values[:, g], axis=1).max()) for g in self.groups), default=0.0)
 
 
@@ -74,24 +98,21 @@ def trajectories(
     return tuple(out)
 
 
-def measure(
-    chain: ClosedChain, paths: Sequence[Trajectory], name: str, *, about: Array, normal: Array | None = None
-) -> Rows:
-    """Return one quantity over all trajectories.
+def measure(chain: ClosedChain, paths: Sequence[Trajectory], name: str, *, about: Array) -> Rows:
+    """Return one quantity over all trajectories: what `inverse_dynamics` calls so, all three components of vectors.
 
     Args:
         name: one of `MEASURES`; angular momentum is its deviation from the mean of each motion.
         about: point of moments and angular momentum (3,) [m].
-        normal: normal of the plane (3,): only in-plane forces and the moment along it count.
     """
     if name not in MEASURES:
         raise UnknownNameError("quantity", name, MEASURES)
     if not paths:
         raise InvalidInputError("motions", [], f"must hold at least one motion for {name}")
-    parts = [_one(chain, path, name, about, normal) for path in paths]
+    parts = [_one(chain, path, name, about) for path in paths]
     F, f = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
     if name == "bearing_force":
-        return _bearings(chain, F, f, flat=normal is not None)
+        return _bearings(chain, F, f)
     if name == "torque":
         single = tuple(slice(k, k + 1) for k in range(chain.na))
         return Rows(name, F, f, single, chain.actuated)
@@ -109,43 +130,29 @@ def reflected_inertia(chain: ClosedChain, paths: Sequence[Trajectory]) -> Array:
     return total / max(count, 1)
 
 
-def _one(chain: ClosedChain, path: Trajectory, name: str, about: Array, normal: Array | None) -> tuple[Array, Array]:
+def _one(chain: ClosedChain, path: Trajectory, name: str, about: Array) -> tuple[Array, Array]:
     if name == "bearing_force":
-        return _bearing_rows(chain, path, normal)
+        return _bearing_rows(chain, path)
     Y = regressor(chain, path, name, about=about)
     F, f = np.array(Y.matrix), np.array(Y.offset)
-    if normal is not None and name != "torque":
-        axes = plane_axes(normal)
-        P = axes[:2] if name == "shaking_force" else axes[2:]
-        F, f = np.matmul(P, F), f @ P.T
     if name == "angular_momentum":
         F, f = F - F.mean(axis=0), f - f.mean(axis=0)
     return F, f
 
 
-def _bearing_rows(chain: ClosedChain, path: Trajectory, normal: Array | None) -> tuple[Array, Array]:
-    """Return the forces in all joints and closures, in the plane or (nan where indeterminate) in space."""
-    if normal is None:
-        parts = [regressor(chain, path, x) for x in ("joint_reactions", "closure_reactions")]
-        keep = [np.arange(p.offset.shape[1]) % 6 < 3 for p in parts]
-        F = np.concatenate([p.matrix[:, k] for p, k in zip(parts, keep, strict=True)], axis=1)
-        return F, np.concatenate([p.offset[:, k] for p, k in zip(parts, keep, strict=True)], axis=1)
+def _bearing_rows(chain: ClosedChain, path: Trajectory) -> tuple[Array, Array]:
+    """Return the determinate part of the forces in all joints and closures, three rows each."""
     joint, closure = reactions(chain, path)
-    both = np.concatenate([joint, closure], axis=1)[:, :, :3]
-    flat = np.matmul(plane_axes(normal)[:2], both).reshape(len(path), -1, both.shape[-1])
-    return flat[..., :-1], flat[..., -1]
+    forces = np.concatenate([joint, closure], axis=1)[:, :, :3]
+    forces = np.matmul(determinate(inverse_dynamics(chain, path).reactions.free), forces)
+    forces = forces.reshape(len(path), -1, forces.shape[-1])
+    return forces[..., :-1], forces[..., -1]
 
 
-def _bearings(chain: ClosedChain, F: Array, f: Array, *, flat: bool) -> Rows:
-    """Group the rows by joint and closure, without those that the model leaves open."""
+def _bearings(chain: ClosedChain, F: Array, f: Array) -> Rows:
+    """Group the rows by joint and closure, without those of which nothing is determinate."""
     names = (*chain.joints, *(c.name for c in chain.closures))
-    size = 2 if flat else 3
-    determinate = np.asarray(~np.isnan(f).any(axis=0))
-    groups, labels, start = [], [], 0
-    for k, name in enumerate(names):
-        count = int(determinate[size * k : size * (k + 1)].sum())
-        if count:
-            groups.append(slice(start, start + count))
-            labels.append(name)
-        start += count
-    return Rows("bearing_force", F[:, determinate], f[:, determinate], tuple(groups), tuple(labels))
+    used = [k for k in range(len(names)) if F[:, 3 * k : 3 * k + 3].any() or f[:, 3 * k : 3 * k + 3].any()]
+    rows = np.array([3 * k + i for k in used for i in range(3)], dtype=np.intp)
+    groups = tuple(slice(3 * k, 3 * k + 3) for k in range(len(used)))
+    return Rows("bearing_force", F[:, rows], f[:, rows], groups, tuple(names[k] for k in used))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from fivebar_pin.balancing._quantities import MEASURES, Rows
 from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
+_NOWHERE = 1e-15  # share of a direction in vectors along motions that is round-off [-]
 LINEAR = ("added_mass", "inertia")
 TERMS = (*LINEAR, "distance", *(f"{s}_{m}" for m in MEASURES for s in ("rms", "peak", "mean_square")))
 
@@ -47,12 +48,14 @@ class Term:
             may be negative.
         signed: whether the single row counts with its sign.
         scale: typical size, in the term's unit.
+        measured: the term of bodies that have given parameters (nb, 10); `value` at what they were lifted from.
     """
 
     name: str
     vectors: tuple[tuple[Array, Array], ...]
     signed: bool
     scale: float
+    measured: Callable[[Array], float]
 
     def value(self, y: Array) -> float:
         """Return the term at y (n,)."""
@@ -106,9 +109,9 @@ def first(size: int) -> Array:
     return e
 
 
-def linear_term(name: str, row: Array, constant: float, scale: float) -> Term:
+def linear_term(name: str, row: Array, constant: float, scale: float, measured: Callable[[Array], float]) -> Term:
     """Make a term row @ y + constant."""
-    return Term(name, ((row[None], np.array([constant])),), True, scale)
+    return Term(name, ((row[None], np.array([constant])),), True, scale, measured)
 
 
 def rows_term(name: str, rows: Rows, E: Array, pi0: Array, present: Array) -> Term:
@@ -127,9 +130,26 @@ def rows_term(name: str, rows: Rows, E: Array, pi0: Array, present: Array) -> Te
         vectors: tuple[tuple[Array, Array], ...] = ((R[:, :-1], R[:, -1]),)
     else:
         value = rows.peak(present)
-        vectors = tuple((G[k, s], g[k, s]) for s in rows.groups for k in range(len(g)))
+        vectors = tuple(pair for s in rows.groups for pair in _thin(G[:, s], g[:, s]))
     without = float(np.abs(rows.F * np.abs(present)).max(initial=0.0))
-    return Term(name, vectors, False, value if value > 1e-3 * without else (without or 1.0))
+    measured = rows.rms if name.startswith("rms_") else rows.peak
+    return Term(name, vectors, False, value if value > 1e-3 * without else (without or 1.0), measured)
+
+
+def _thin(G: Array, g: Array) -> list[tuple[Array, Array]]:
+    """Return vectors G y + g of the same lengths without the directions in which none ever points.
+
+    A moment about the normal of a plane is one row instead of three: its cone is a pair of bounds.
+
+    Args:
+        G, g: one vector a sample (n, d, k), (n, d).
+    """
+    if g.shape[1] > 1:
+        whole = np.moveaxis(np.concatenate([G, g[..., None]], axis=2), 1, 0).reshape(g.shape[1], -1)
+        axes, size, _ = np.linalg.svd(whole, full_matrices=False)
+        axes = axes[:, size > _NOWHERE * size[0]] if size[0] > 0.0 else axes[:, :1]
+        G, g = np.matmul(axes.T, G), g @ axes
+    return list(zip(G, g, strict=True))
 
 
 def torque_limits(limit: npt.ArrayLike, rows: Rows, E: Array, pi0: Array) -> list[Block]:

@@ -141,7 +141,9 @@ def balance_conditions(
         about: point (3,) of the angular momentum; plays no part when the force is balanced too.
         near: closed configuration (nq,): balance only the branch that it can reach. By default the conditions hold on
             every assembly mode; they differ only for special lengths (parallelograms and the like).
-        space: "planar" (four parameters per body, in-plane force and moment), "spatial" (ten), or "auto".
+        space: "planar" (four parameters per body, force in the plane and moment about its normal), "spatial" (ten, all
+            components: of a planar mechanism too, whose bodies shake out of the plane where they lie at different
+            heights), or "auto".
         samples: number of configurations; from the number of bodies unless given, and more while the rank is not
             clear.
         seed: of the samples.

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, figures, frozen
 from fivebar_pin.balancing._making import across, arm_width
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import reflected_inertia
@@ -102,8 +102,7 @@ class Realisation:
 
     def __str__(self) -> str:
         lines = [repr(self), *(f"  {w}" for w in self.weights)]
-        rows = [(name, f"{x:.6g}", f"{self.terms[name]:.6g}") for name, x in self.promised.items()]
-        lines += [f"  {name}: {x} promised, {y} realised" for name, x, y in rows]
+        lines += [f"  {name}: {x} promised, {y} realised" for name, (x, y) in self.figures.items()]
         return "\n".join([*lines, f"  {self.claim}"])
 
     @property
@@ -133,6 +132,15 @@ class Realisation:
         """The same, measured on the bodies that were made."""
         return {name: self._measured(name) for name in self.promised}
 
+    @property
+    def figures(self) -> dict[str, tuple[str, str]]:
+        """What is promised and what is realised, for people to read: round-off is written as 0."""
+        scale = self.design.scale
+        return {
+            name: (figures(x, scale(name), digits=6), figures(self.terms[name], scale(name), digits=6))
+            for name, x in self.promised.items()
+        }
+
     @cached_property
     def residual(self) -> float:
         """Largest residual of the conditions of what was made, over the moving mass [-]."""
@@ -161,7 +169,8 @@ class Realisation:
         kind = "of this kind and with these arms" if d.arms else "of this kind"
         if d.status == "optimal":
             return f"optimal: no counterweights {kind} are better than {d.dual_bound:.9g}"
-        return f"not proved optimal: objective {d.objective:.9g}, none {kind} is better than {d.dual_bound:.9g}"
+        best = f"none {kind} is better than {d.dual_bound:.9g}"
+        return f"not proved optimal: objective {d.objective_text(digits=9)}, {best}"
 
     def _measured(self, name: str) -> float:
         d, pi = self.design, self.parameters

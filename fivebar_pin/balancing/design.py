@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, figures, settled
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import Rows
+from fivebar_pin.balancing._terms import measure_of
 from fivebar_pin.balancing.conditions import BalanceConditions
 from fivebar_pin.balancing.pieces import Piece
 from fivebar_pin.balancing.solvers import Certificate
@@ -106,9 +107,14 @@ class Design:
             return f"Design({self.original.name!r}, {self.kind}: infeasible; {self.certificate}{hint})"
         where = "" if self.branch is None else f", only on the branch of {self.branch.round(6).tolist()}"
         return (
-            f"Design({self.original.name!r}, {self.kind}: {self.status}, objective {self.objective:.6g}, "
+            f"Design({self.original.name!r}, {self.kind}: {self.status}, objective {self.objective_text()}, "
             f"gap {self.gap:.1e}, residual {self.residual:.1e}{where})"
         )
+
+    def objective_text(self, *, digits: int = 6) -> str:
+        """Return the objective in figures; 0 where every term of it is round-off."""
+        some = any(settled(x, self.scale(term)) for term, x in self.terms.items())
+        return figures(self.objective if some else 0.0, digits=digits)
 
     def __str__(self) -> str:
         lines = [repr(self)]
@@ -123,8 +129,14 @@ class Design:
                 lines.append(f"  {sign} {c.body}: {c.mass:.6g} kg at ({place}) m")
         lines += [f"  + {c.body}: arm of {c.mass:.6g} kg" for c in self.arms]
         if self.feasible:
-            lines += [f"  {k}: {self.before[k]:.5g} -> {self.after[k]:.5g}" for k in self.before]
+            lines += [f"  {k}: {self._written(k)}" for k in self.before]
         return "\n".join(lines)
+
+    def _written(self, term: str) -> str:
+        """Return a term before and after, round-off as 0."""
+        sizes = (self._scale(term, pi) for pi in (self.original.inertial_parameters, self.parameters))
+        values = (self.before[term], self.after[term])
+        return " -> ".join(figures(x, size, digits=5) for x, size in zip(values, sizes, strict=True))
 
     @property
     def feasible(self) -> bool:
@@ -147,13 +159,26 @@ class Design:
 
     @cached_property
     def before(self) -> dict[str, float]:
-        """Rms and peak of each quantity of the original over the given motions, "rms_torque" and so on."""
+        """Rms and peak of each quantity of the original over the given motions, "rms_torque" and so on.
+
+        Torque, shaking force and moment; frame force and moment too where gravity acts; what the objective needs.
+        """
         return self._measured(self.original.inertial_parameters)
 
     @cached_property
     def after(self) -> dict[str, float]:
         """The same of the design."""
         return self._measured(self.parameters)
+
+    def scale(self, term: str) -> float:
+        """Return the sum of the sizes of what adds up to a term of the design, see `Loads.scale`; 0 when unknown."""
+        return self._scale(term, self.parameters)
+
+    def _scale(self, term: str, pi: Array) -> float:
+        if term == "added_mass":
+            return self.original.mass + float(pi[:, 0].sum())
+        rows = self.rows.get(measure_of(term) or "")
+        return 0.0 if rows is None else rows.scale(term, pi)
 
     def _measured(self, pi: Array) -> dict[str, float]:
         return {f"{s}_{name}": getattr(rows, s)(pi) for name, rows in self.rows.items() for s in ("rms", "peak")}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, figures, frozen
 from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._terms import check_terms
 from fivebar_pin.balancing.design import Design
@@ -44,8 +44,12 @@ class ParetoFront:
         return len(self.designs)
 
     def __repr__(self) -> str:
-        (a, b), (c, d) = self.values[0], self.values[-1]
-        return f"ParetoFront({len(self)} designs: {self.first} {a:.4g} .. {c:.4g}, {self.second} {b:.4g} .. {d:.4g})"
+        ends = (self.designs[0], self.designs[-1])
+        spans = [
+            f"{name} " + " .. ".join(figures(design.terms[name], design.scale(name)) for design in ends)
+            for name in (self.first, self.second)
+        ]
+        return f"ParetoFront({len(self)} designs: {', '.join(spans)})"
 
 
 def pareto(
@@ -138,10 +142,12 @@ class Comparison:
     Attributes:
         names: of the mechanisms.
         values: per term one value for each mechanism.
+        scales: per term the sum of the sizes of what adds up to it, the largest of all mechanisms; see `Loads.scale`.
     """
 
     names: tuple[str, ...]
     values: dict[str, Array]
+    scales: dict[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Comparison({', '.join(self.names)}: {', '.join(self.values)})"
@@ -150,7 +156,9 @@ class Comparison:
         width = max(map(len, self.names)) + 2
         column = max(13, width)
         lines = [" " * 24 + "".join(f"{name:>{column}}" for name in self.names)]
-        lines += [f"{term:<24}" + "".join(f"{x:>{column}.5g}" for x in row) for term, row in self.values.items()]
+        for term, row in self.values.items():
+            words = (figures(float(x), self.scales.get(term, 0.0), digits=5) for x in row)
+            lines.append(f"{term:<24}" + "".join(f"{word:>{column}}" for word in words))
         return "\n".join(lines)
 
 
@@ -158,6 +166,7 @@ def compare(
     chains: Mapping[str, ClosedChain | Design],
     motions: Motions,
     *,
+    about: npt.ArrayLike = (0.0, 0.0, 0.0),
     near: npt.ArrayLike | None = None,
     terms: Sequence[str] = (
         "inertia",
@@ -174,7 +183,7 @@ def compare(
 
     Args:
         chains: mechanisms or designs by name; the kinematics, gravity and friction are those of the first.
-        motions, near, terms: as for `score`.
+        motions, about, near, terms: as for `score`.
 
     Raises:
         InvalidInputError: no mechanism, or mechanisms with different bodies.
@@ -186,6 +195,7 @@ def compare(
     for name, chain in made.items():
         if chain.joints != one.joints:
             raise InvalidInputError(f"joints of {name}", chain.joints, f"must be {one.joints}")
-    scores = score(one, motions, np.stack([c.inertial_parameters for c in made.values()]), terms=terms, near=near)
+    designs = np.stack([c.inertial_parameters for c in made.values()])
+    scores = score(one, motions, designs, terms=terms, about=about, near=near)
     mass = np.array([c.mass for c in made.values()])
-    return Comparison(tuple(made), {"mass": mass, **{t: scores[t] for t in terms}})
+    return Comparison(tuple(made), {"mass": mass, **{t: scores[t] for t in terms}}, dict(scores.scales))

@@ -51,10 +51,11 @@ def balance(
     Args:
         chain: the mechanism.
         kind: what is exact: "force", "moment", "dynamic", "static", or None for nothing.
-        minimise: a term, or terms with weights: added_mass [kg], inertia (mean trace of N^T M N) [kg m2], distance (to
-            the present design, scaled) [-], and rms_, peak_ or mean_square_ of torque, shaking_force, shaking_moment,
-            bearing_force, angular_momentum (its deviation from the mean) over the motions. The added mass unless
-            given, for a redesign the distance.
+        minimise: a term, or terms with weights: added_mass [kg], inertia (mean trace of N^T M N of the bodies, rotors
+            apart) [kg m2], distance (to the present design, scaled) [-], and rms_, peak_ or mean_square_ of torque,
+            shaking_force, shaking_moment, frame_force, frame_moment, bearing_force, angular_momentum (its deviation
+            from the mean) over the motions: what `inverse_dynamics` of the design calls so, all components. The added
+            mass unless given, for a redesign the distance.
         bodies: names of the joints whose bodies may change; all that influence the conditions unless given.
         mode: "add" material to the present bodies, or "redesign" them.
         region: where material may lie, one for all bodies or by body; a ball about the joint frame with the chain's

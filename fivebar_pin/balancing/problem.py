@@ -199,7 +199,7 @@ class BalanceProblem:
                 f"misses the conditions by {residual:.2g} ({_EXACT:g} is allowed) and its least physical body by "
                 f"{max(0.0, -parts.lowest):.2g} ({_PHYSICAL:g})"
             )
-        values = {name: self.terms[base(name)].value(y) for name in weights}
+        values = {name: self.terms[base(name)].measured(parts.parameters) for name in weights}
         squared = {k: v * v if k.startswith("mean_square_") else v for k, v in values.items()}
         objective = sum(weights[k] * squared[k] for k in weights)
         P, unit = cost
@@ -321,7 +321,9 @@ def balance_problem(
     wanted = {measure_of(t) for t in (*objectives, *(limits or {}))} - {None}
     if paths:
         wanted |= {"torque", "shaking_force", "shaking_moment"}
-    rows = {m: measure(chain, paths, m, about=point, normal=own.normal) for m in MEASURES if m in wanted}
+        if chain.model.gravity.linear.any():
+            wanted |= {"frame_force", "frame_moment"}
+    rows = {m: measure(chain, paths, m, about=point) for m in MEASURES if m in wanted}
     given = Given(
         chain=chain,
         kind=kind,
@@ -364,11 +366,11 @@ def assembled(given: Given, sizes: Sizes | None = None, arms: Array | None = Non
         given.bodies, given.removable, given.region, given.counterweight, given.density, sizes or {}
     )
     E, X0 = setup.map(materials)
+    full_E = _lift.linear(chain, space, setup.mass, materials)
     present = chain.inertial_parameters + arms
-    unit = (space.scale * setup.mass)[:, None]
-    to_pi = space.injection()
-    start = present.reshape(-1) - to_pi @ space.of(present).reshape(-1)
-    full_E, full_0 = to_pi @ (unit * E), start + to_pi @ (unit[:, 0] * X0)
+    if given.mode == "redesign":
+        present[[m.body for m in materials]] = 0.0
+    full_0 = present.reshape(-1)
     n = E.shape[1]
     maker = TermMaker(chain, setup, dict(given.rows), given.paths, E, X0, full_E, full_0)
     limited = maker.limits(given.limits)

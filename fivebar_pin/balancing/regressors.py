@@ -5,12 +5,12 @@ acceleration alpha, and parameters m, h = m c, I about the joint origin, all sum
 
     p_lin = m u + w x R h                       l_o = R h x u + R I R^T w
     f     = m (a_o - g) + (alpha x + w x w x) R h
-    n_o   = R h x (a_o - g) + R (I R^T alpha + R^T w x I R^T w)
+    n_o   = R h x (a_o - g) + R (I R^T alpha + R^T w x I R^T w)          f_0, n_0: the same at g = 0
     E_kin = (u . p_lin + w . l_o) / 2           E_pot = -g . (m p + R h)
 
 Moments move to another point by the lever times the force. With S_j the joint columns that carry the body and N the
-complement, tau = sum N^T S_j^T [f; n] and F = -sum f. Armature, damping and dry friction do not depend on the
-parameters: they make the offset.
+complement, tau = sum N^T S_j^T [f; n]; the frame is shaken by -sum f_0 and carries -sum f. Armature, damping and dry
+friction do not depend on the parameters: they make the offset.
 """
 
 from __future__ import annotations
@@ -71,10 +71,11 @@ def regressor(
     Args:
         chain: the mechanism; its present inertial parameters play no part.
         trajectory: of this chain.
-        quantity: one of `QUANTITIES`: linear_momentum, angular_momentum, shaking_force, shaking_moment (3 rows each),
-            torque, gravity_torque (na rows), potential_energy, kinetic_energy (1 row), joint_reactions (6 rows per
-            body), closure_reactions (6 rows per closure). Signs and axes are those of `inverse_dynamics`.
-        about: point that angular momentum and shaking moment refer to (3,) [m], world.
+        quantity: one of `QUANTITIES`: linear_momentum, angular_momentum, shaking_force, shaking_moment, frame_force,
+            frame_moment (3 rows each), torque, gravity_torque (na rows), potential_energy, kinetic_energy (1 row),
+            joint_reactions (6 rows per body), closure_reactions (6 rows per closure). Signs, axes and meaning are
+            those of `inverse_dynamics`: the rotors (armature) are in the torque alone.
+        about: point that angular momentum, shaking and frame moment refer to (3,) [m], world.
 
     Raises:
         UnknownNameError: a quantity that does not exist.
@@ -91,6 +92,11 @@ def _no_offset(matrix: Array) -> tuple[Array, Array]:
     return matrix, np.zeros(matrix.shape[:2])
 
 
+def _rate(chain: ClosedChain, trajectory: Trajectory) -> Array:
+    """Return the rate of momentum at the world origin (n, 6, 10 nb)."""
+    return side_by_side(state_of(chain, trajectory).wrench(np.zeros(3)))
+
+
 def _linear_momentum(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
     return _no_offset(side_by_side(state_of(chain, trajectory).momentum())[:, :3])
 
@@ -100,10 +106,18 @@ def _angular_momentum(chain: ClosedChain, trajectory: Trajectory, about: Array) 
 
 
 def _shaking_force(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    return _no_offset(-side_by_side(state_of(chain, trajectory).wrench(gravity_of(chain)))[:, :3])
+    return _no_offset(-_rate(chain, trajectory)[:, :3])
 
 
 def _shaking_moment(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
+    return _no_offset(-moved(_rate(chain, trajectory), about))
+
+
+def _frame_force(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
+    return _no_offset(-side_by_side(state_of(chain, trajectory).wrench(gravity_of(chain)))[:, :3])
+
+
+def _frame_moment(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
     return _no_offset(-moved(side_by_side(state_of(chain, trajectory).wrench(gravity_of(chain))), about))
 
 
@@ -146,6 +160,8 @@ _BUILDERS: dict[str, Callable[[ClosedChain, Trajectory, Array], tuple[Array, Arr
     "angular_momentum": _angular_momentum,
     "shaking_force": _shaking_force,
     "shaking_moment": _shaking_moment,
+    "frame_force": _frame_force,
+    "frame_moment": _frame_moment,
     "torque": _torque,
     "gravity_torque": _gravity_torque,
     "potential_energy": _potential_energy,

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, checked, figures, frozen
 from fivebar_pin.balancing._quantities import Motions, Rows, measure, reflected_inertia, trajectories
 from fivebar_pin.balancing._terms import LINEAR, TERMS, base, check_terms, measure_of, numbers
 from fivebar_pin.chain import ClosedChain
@@ -34,9 +34,11 @@ class Scores:
 
     Attributes:
         values: by term name, (k,) each.
+        scales: by term name, the largest sum of the sizes of what adds up to it; see `Loads.scale`.
     """
 
     values: MappingProxyType[str, Array]
+    scales: MappingProxyType[str, float]
 
     def __getitem__(self, term: str) -> Array:
         return self.values[term]
@@ -45,7 +47,8 @@ class Scores:
         return int(next(iter(self.values.values())).size)
 
     def __repr__(self) -> str:
-        best = ", ".join(f"{name} from {x.min():.4g}" for name, x in self.values.items()) if len(self) else ""
+        least = {name: figures(float(x.min()), self.scales[name]) for name, x in self.values.items() if len(self)}
+        best = ", ".join(f"{name} from {x}" for name, x in least.items())
         return f"Scores({len(self)} designs; {best})"
 
     def best(self, term: str) -> int:
@@ -69,8 +72,9 @@ def score(
         chain: the mechanism; gravity, friction and rotor inertia are its own, the bodies those of the designs.
         motions: motions (driven from `near`) or trajectories.
         designs: inertial parameters (k, nb, 10), or (nb, 10) for one.
-        terms: rms_, peak_ or mean_square_ of torque (all motors), shaking_force, shaking_moment, bearing_force,
-            angular_momentum (deviation from the mean); added_mass, inertia. Vectors count with their length.
+        terms: rms_, peak_ or mean_square_ of torque (all motors), shaking_force, shaking_moment, frame_force,
+            frame_moment, bearing_force, angular_momentum (deviation from the mean); added_mass, inertia. Vectors count
+            with their length, all three components; an rms is over the samples.
         about: point of moments (3,) [m].
         near: picks the assembly mode of motions.
         progress: called with (designs done, designs in all) after every block.
@@ -101,7 +105,10 @@ def score(
         _fill(out, part, X[part].reshape(part.stop - start, -1), factors, linear, peaks)
         if progress is not None:
             progress(part.stop, len(X))
-    return Scores(MappingProxyType({t: frozen(x) for t, x in out.items()}))
+    largest = np.abs(X).max(axis=0, initial=0.0)
+    scales = {t: rows[m].scale(t, largest) for t in wanted if (m := measure_of(t))}
+    scales |= {t: chain.mass + float(largest[:, 0].sum()) if t == "added_mass" else 0.0 for t in linear}
+    return Scores(MappingProxyType({t: frozen(x) for t, x in out.items()}), MappingProxyType(scales))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

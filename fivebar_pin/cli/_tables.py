@@ -20,11 +20,6 @@ def console() -> Console:
     return Console(highlight=False, soft_wrap=False)
 
 
-def number(value: float) -> str:
-    """Write a number with four figures, round-off as what it is."""
-    return f"{value:.4g}"
-
-
 def table(console: Console, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table, first column to the left, the others to the right; no number is cut on a narrow terminal."""
     from rich import box
@@ -51,9 +46,7 @@ def peak(x: Array) -> float:
     return float(size.max())
 
 
-def rms(x: Array, t: Array) -> float:
-    """Return the root mean square over time (trapezoidal rule)."""
+def rms(x: Array) -> float:
+    """Return the root mean square over the samples, as the rms_ terms of a design: of vectors (n, k), numbers (n,)."""
     square = np.sum(x * x, axis=1) if x.ndim == 2 else x * x
-    if t.size == 1:
-        return float(np.sqrt(square[0]))
-    return float(np.sqrt(np.sum(0.5 * (square[1:] + square[:-1]) * np.diff(t)) / (t[-1] - t[0])))
+    return float(np.sqrt(np.mean(square)))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import figures, settled
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
@@ -62,8 +62,10 @@ def run_conditions(chosen: argparse.Namespace) -> int:
     conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen))
     console = _tables.console()
     console.print(str(conditions), markup=False, soft_wrap=True)
-    residual = np.abs(conditions.residual(chain)).max(initial=0.0)
-    console.print(f"largest residual of {chain.name} as it is: {residual:.4g}", markup=False)
+    residual = float(np.abs(conditions.residual(chain)).max(initial=0.0))
+    sizes = np.abs(conditions.matrix) @ np.abs(chain.inertial_parameters.reshape(-1))
+    words = figures(residual, float(sizes.max(initial=0.0)))
+    console.print(f"largest residual of {chain.name} as it is: {words} kg", markup=False)
     return 0
 
 
@@ -108,7 +110,8 @@ def run_pareto(chosen: argparse.Namespace) -> int:
     console = _tables.console()
     with console.status("tracing the front"):
         front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)
-    rows = [[f"{a:.6g}", f"{b:.6g}"] for a, b in front.values]
+    pair = (chosen.first, chosen.second)
+    rows = [[figures(d.terms[name], d.scale(name), digits=6) for name in pair] for d in front.designs]
     _tables.table(console, f"{chain.name}: {chosen.kind} balance", (chosen.first, chosen.second), rows)
     if chosen.out:
         columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]
@@ -216,7 +219,7 @@ def _given(option: str, name: str, value: float | None) -> float:
 
 
 def _title(design: Any) -> str:
-    return f"{design.original.name}: {_balance(design)} (weight left out of the force)"
+    return f"{design.original.name}: {_balance(design)}"
 
 
 def _balance(design: Any) -> str:
@@ -233,7 +236,7 @@ def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedCh
     made = realise(design)
     for weight in made.weights:
         console.print(f"  {weight}", markup=False, soft_wrap=True)
-    rows = [[name, f"{x:.6g}", f"{made.terms[name]:.6g}"] for name, x in made.promised.items()]
+    rows = [[name, *words] for name, words in made.figures.items()]
     _tables.table(console, "Counterweights", ("", "promised", "realised"), rows)
     console.print(f"{made.claim}", markup=False, soft_wrap=True)
     return made.chain
@@ -242,60 +245,48 @@ def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedCh
 def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]) -> None:
     changes = [("added", c) for c in design.added] + [("removed", c) for c in design.removed]
     rows = [
-        [word, c.body, f"{c.mass:.6g}", ", ".join(f"{x + 0.0:.5g}" for x in np.round(c.place, 12)), _inertia(design, c)]
+        [word, c.body, f"{c.mass:.6g}", _place(design, c), _inertia(design, c)]
         for word, c in changes
         if c.mass > 1e-7 * design.original.mass
     ]
-    title = f"{design.original.name}: {_balance(design)}, {design.status}; moving mass {design.added_mass:+.6g} kg"
+    title = f"{design.original.name}: {_balance(design)}, {design.status}; moving mass {_gained(design)} kg"
     headings = ("", "body of joint", "mass [kg]", "at [m], joint axes", "inertia about it [kg m2]")
     _tables.table(console, title, headings, rows)
-    t = pair[0].trajectory.t
-    rows = []
-    for name, curves in _curves(design, after, pair).items():
-        cells = [_tables.number(x) for c in curves for x in (_tables.peak(c), _tables.rms(c, t))]
-        rows.append([name, *cells])
-    _tables.table(
-        console, "Along the motion (* weight left out)", ("", "before: peak", "RMS", "after: peak", "RMS"), rows
-    )
+    frame = any(one.loads.loaded for one in pair)
+    columns = [_output.curves(one.chain, one.loads, frame=frame) for one in pair]
+    rows = [[same[0].name, *(cell for curve in same for cell in curve.cells)] for same in zip(*columns, strict=True)]
+    _tables.table(console, "Along the motion", ("", "before: peak", "RMS", "after: peak", "RMS"), rows)
     rows = [
         ["material", design.material or "any density"],
-        ["objective", f"{design.objective:.9g}"],
+        ["objective", design.objective_text(digits=9)],
         ["no design is better than", f"{design.dual_bound:.9g}"],
-        ["residual of the conditions, relative", _tables.number(design.residual)],
+        ["residual of the conditions, relative", figures(design.residual)],
     ]
     _tables.table(console, "Certificate", ("", ""), rows)
+
+
+def _gained(design: Any) -> str:
+    return f"{settled(design.added_mass, design.scale('added_mass')):+.6g}"
+
+
+def _place(design: Any, change: Any) -> str:
+    return ", ".join(figures(float(x), design.original.length, digits=5) for x in change.place)
 
 
 def _inertia(design: Any, change: Any) -> str:
     """Write the inertia about the normal of the plane of motion, or the principal ones of a spatial mechanism."""
     if design.space.planar:
         normal = design.space.axes[design.space.bodies.index(change.body), 2]
-        return _tables.number(float(normal @ change.inertia @ normal))
+        return figures(float(normal @ change.inertia @ normal))
     return ", ".join(f"{x:.3g}" for x in np.linalg.eigvalsh(change.inertia))
 
 
 def _moving(design: Any, after: ClosedChain, trajectory: Trajectory) -> list[Any]:
-    """Return before and after for the viewer, with the loads of inertia alone: weight does not shake."""
+    """Return before and after for the viewer, with their loads."""
     from fivebar_pin.viz import Shown
 
-    out = []
-    for label, chain in (("before", design.original), ("after", after)):
-        weightless = chain.with_gravity((0.0, 0.0, 0.0))
-        out.append(Shown(weightless, trajectory, inverse_dynamics(weightless, trajectory), label))
-    return out
-
-
-def _curves(design: Any, after: ClosedChain, pair: list[Any]) -> dict[str, list[Array]]:
-    """Return the curves to compare: torques with gravity, shaking force and moment without the weight."""
-    trajectory = pair[0].trajectory
-    whole = [inverse_dynamics(chain, trajectory) for chain in (design.original, after)]
-    curves: dict[str, list[Array]] = {}
-    for k, name in enumerate(design.original.actuated):
-        unit = "N" if _output.joint_unit(design.original, name) == "m" else "N m"
-        curves[f"drive at {name} [{unit}]"] = [loads.torque[:, k] for loads in whole]
-    curves["shaking force* [N]"] = [one.loads.shaking_force for one in pair]
-    curves["shaking moment* [N m]"] = [one.loads.shaking_moment for one in pair]
-    return curves
+    both = {"before": design.original, "after": after}
+    return [Shown(chain, trajectory, inverse_dynamics(chain, trajectory), label) for label, chain in both.items()]
 
 
 def _write(
@@ -305,21 +296,10 @@ def _write(
 
     files = list(io.save(after, folder, name=f"{design.original.name}_balanced", overwrite=overwrite))
     columns = _output.motion_columns(design.original, trajectory)
-    for label, chain in (("before", design.original), ("after", after)):
-        loads = inverse_dynamics(chain, trajectory)
-        columns += [(f"{label} {name}", x) for name, x in _output.load_columns(chain, loads)]
+    for one in pair:
+        columns += [(f"{one.label} {name}", x) for name, x in _output.load_columns(one.chain, one.loads)]
     files.append(_output.write_columns(folder / "results.csv", columns))
-    inertial = {one.label: one.loads for one in pair}
-    whole = {
-        "before": inverse_dynamics(design.original, trajectory),
-        "after": inverse_dynamics(after, trajectory),
-    }
-    t = trajectory.t
-    figures = {
-        "shaking": viz.plots.shaking(inertial, t=t, title="Shaking force and moment, weight left out"),
-        "mass_centre": viz.plots.com(inertial),
-        "torques": viz.plots.torques(whole, design.original.actuated, t=t),
-    }
-    files += viz.plots.save(figures, folder, overwrite=overwrite)
+    made: Any = _output.load_figures({one.label: one.loads for one in pair}, trajectory.t)
+    files += viz.plots.save(made, folder, overwrite=overwrite)
     files.append(viz.html(folder / "animation.html", pair, title=_title(design), overwrite=overwrite))
     return files

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fivebar_pin import motion as laws
-from fivebar_pin._arrays import Array, number
+from fivebar_pin._arrays import Array, figures, number
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.dynamics import Loads, inverse_dynamics
@@ -37,10 +37,12 @@ class _Run:
     loads: Loads
     closed: Solution
 
-    @property
-    def travel(self) -> float:
-        """Largest distance of the mass centre from where it starts [m]."""
-        return _tables.peak(self.loads.com - self.loads.com[0])
+    def curves(self, *, frame: bool) -> list[_output.Curve]:
+        """Return torques, what acts on the frame (with `frame` what it carries, too) and the joint forces."""
+        return _output.curves(self.chain, self.loads, frame=frame) + [
+            _output.Curve(f"joint force {f} [N]", self.closed.joint_forces[:, k], self.loads.scale("frame_force"))
+            for k, f in enumerate(FORCES)
+        ]
 
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -119,9 +121,9 @@ def _print_balance(console: Console, case: str, unbalanced: FiveBar, optimum: An
     rows = [
         (
             f"link {i + 1}",
-            _tables.number(unbalanced.masses[i]),
-            _tables.number(unbalanced.rho[i]),
-            _tables.number(linkage.masses[i]),
+            figures(unbalanced.masses[i]),
+            figures(unbalanced.rho[i]),
+            figures(linkage.masses[i]),
             f"{linkage.rho[i]:.9f}",
             f"{round(linkage.alpha[i], 9) + 0.0:.9f}",
         )
@@ -132,25 +134,14 @@ def _print_balance(console: Console, case: str, unbalanced: FiveBar, optimum: An
 
 
 def _print_comparison(console: Console, runs: list[_Run]) -> None:
-    quantities: list[tuple[str, Any]] = [
-        ("torque at psi [N m]", lambda r: r.loads.torque[:, 0]),
-        ("torque at gamma [N m]", lambda r: r.loads.torque[:, 1]),
-        ("shaking force [N]", lambda r: r.loads.shaking_force),
-        ("shaking moment at O1 [N m]", lambda r: r.loads.shaking_moment),
-        *((f"joint force {f} [N]", lambda r, k=k: r.closed.joint_forces[:, k]) for k, f in enumerate(FORCES)),
-    ]
-    rows = []
-    for name, of in quantities:
-        row = [name]
-        for r in runs:
-            values = of(r)
-            row += [_tables.number(_tables.peak(values)), _tables.number(_tables.rms(values, r.trajectory.t))]
-        rows.append(row)
+    frame = any(r.loads.loaded for r in runs)
+    columns = [r.curves(frame=frame) for r in runs]
+    rows = [[same[0].name, *(cell for curve in same for cell in curve.cells)] for same in zip(*columns, strict=True)]
     headings = ("", "before: peak", "RMS", "after: peak", "RMS")
     _tables.table(console, "Before and after", headings, rows)
     rows = [
-        ["travel of the mass centre [m]", *(_tables.number(r.travel) for r in runs)],
-        ["largest residual of (60)-(69) [-]", *(_tables.number(_condition_residual(r.linkage)) for r in runs)],
+        ["travel of the mass centre [m]", *(figures(r.loads.peak("travel")) for r in runs)],
+        ["largest residual of (60)-(69) [-]", *(figures(_condition_residual(r.linkage)) for r in runs)],
     ]
     _tables.table(console, "Balance", ("", *(r.label for r in runs)), rows)
 
@@ -163,21 +154,21 @@ def _condition_residual(linkage: FiveBar) -> float:
 
 def _print_checks(console: Console, runs: list[_Run], optimum: Any) -> None:
     rows = [
-        ["closure residual [m]", *(_tables.number(r.trajectory.worst_closure) for r in runs)],
+        ["closure residual [m]", *(figures(r.trajectory.worst_closure) for r in runs)],
         ["closed form against Pinocchio, torque", *(_relative(r.closed.torque, r.loads.torque) for r in runs)],
         [
             "closed form against Pinocchio, moment",
             *(_relative(r.closed.shaking_moment, r.loads.shaking_moment) for r in runs),
         ],
-        ["motor power against rate of energy", *(_tables.number(r.loads.power_residual()) for r in runs)],
-        ["shaking wrench against rate of momentum", *(_tables.number(r.loads.momentum_residual()) for r in runs)],
-        ["optimality (KKT) residual", "", _tables.number(optimum.kkt_residual)],
+        ["motor power against rate of energy", *(figures(r.loads.power_residual()) for r in runs)],
+        ["shaking and frame wrench against sums over bodies", *(figures(r.loads.momentum_residual()) for r in runs)],
+        ["optimality (KKT) residual", "", figures(optimum.kkt_residual)],
     ]
     _tables.table(console, "Checks (relative unless a unit is given)", ("", *(r.label for r in runs)), rows)
 
 
 def _relative(x: Array, reference: Array) -> str:
-    return _tables.number(float(np.abs(x - reference).max() / np.abs(reference).max()))
+    return figures(float(np.abs(x - reference).max() / np.abs(reference).max()))
 
 
 def _shown(runs: list[_Run]) -> list[Any]:
@@ -208,10 +199,8 @@ def _figures(runs: list[_Run], motion: Motion) -> dict[str, Any]:
     loads, t = {r.label: r.loads for r in runs}, motion.t
     return {
         "motion": plots.motion(motion, ("psi", "gamma"), title="Motion of the motors"),
-        "torques": plots.torques(loads, ("psi", "gamma"), t=t),
-        "shaking": plots.shaking(loads, t=t),
         "joint_forces": plots.forces({r.label: r.closed.joint_forces for r in runs}, FORCES, t=t),
-        "mass_centre": plots.com(loads),
+        **_output.load_figures(loads, t),
     }
 
 
@@ -222,13 +211,15 @@ def _write_table(file: Path, runs: list[_Run], motion: Motion) -> Path:
         columns += [(f"{name} [rad]", motion.q[:, k]), (f"d{name} [rad/s]", motion.v[:, k])]
         columns.append((f"dd{name} [rad/s2]", motion.a[:, k]))
     for r in runs:
-        vectors = {"F {} [N]": r.loads.shaking_force[:, :2], "com {} [m]": r.loads.com[:, :2]}
+        vectors = {"F {} [N]": r.loads.shaking_force[:, :2], "frame F {} [N]": r.loads.frame_force[:, :2]}
+        vectors |= {"com {} [m]": r.loads.com[:, :2]}
         vectors |= {f"{f} {{}} [N]": r.closed.joint_forces[:, k] for k, f in enumerate(FORCES)}
         columns += [
             (f"{r.label} {x} [rad]", r.closed.angles[:, k]) for k, x in enumerate(("psi", "theta", "phi", "gamma"))
         ]
         columns += [(f"{r.label} tau_{x} [N m]", r.loads.torque[:, k]) for k, x in enumerate(("psi", "gamma"))]
         columns.append((f"{r.label} M_O1 [N m]", r.loads.shaking_moment[:, 2]))
+        columns.append((f"{r.label} frame M_O1 [N m]", r.loads.frame_moment[:, 2]))
         for name, values in vectors.items():
             columns += [(f"{r.label} {name.format(axis)}", values[:, k]) for k, axis in enumerate("xy")]
     return _output.write_columns(file, columns)

@@ -1,13 +1,12 @@
-"""`fivebar-pin loads`: torques, shaking force and moment of any mechanism along a motion."""
+"""`fivebar-pin loads`: torques, what shakes the frame and what it carries, of any mechanism along a motion."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-import numpy as np
-
 from fivebar_pin import motion as laws
+from fivebar_pin._arrays import figures
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
@@ -17,7 +16,7 @@ from fivebar_pin.trajectory import Trajectory
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the parser."""
-    parser = commands.add_parser("loads", help="torques, shaking force and moment of a mechanism along a motion")
+    parser = commands.add_parser("loads", help="torques, what shakes the frame and what it carries, along a motion")
     parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
     parser.add_argument(
         "--motion", metavar="CSV", help="motion of the actuated joints (t, q_*, v_*, a_*); unless given, they sway"
@@ -50,19 +49,13 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _print(console: object, chain: ClosedChain, trajectory: Trajectory, loads: Loads) -> None:
     t = trajectory.t
-    curves: list[tuple[str, np.ndarray]] = [
-        (f"drive at {name} [{'N' if _output.joint_unit(chain, name) == 'm' else 'N m'}]", loads.torque[:, k])
-        for k, name in enumerate(chain.actuated)
-    ]
-    about = ", ".join(f"{x:g}" for x in loads.about)
-    curves += [("shaking force [N]", loads.shaking_force), (f"shaking moment at ({about}) [N m]", loads.shaking_moment)]
-    rows = [[name, _tables.number(_tables.peak(x)), _tables.number(_tables.rms(x, t))] for name, x in curves]
+    rows = [[curve.name, *curve.cells] for curve in _output.curves(chain, loads, frame=loads.loaded)]
     _tables.table(console, f"{chain.name}: {len(t)} samples, {t[-1] - t[0]:g} s", ("", "peak", "RMS"), rows)  # type: ignore[arg-type]
     rows = [
-        ["closure residual [m or rad]", _tables.number(trajectory.worst_closure)],
-        ["motor power against rate of energy", _tables.number(loads.power_residual())],
-        ["shaking wrench against rate of momentum", _tables.number(loads.momentum_residual())],
-        ["travel of the mass centre [m]", _tables.number(_tables.peak(loads.com - loads.com[0]))],
+        ["closure residual [m or rad]", figures(trajectory.worst_closure)],
+        ["motor power against rate of energy", figures(loads.power_residual())],
+        ["shaking and frame wrench against sums over bodies", figures(loads.momentum_residual())],
+        ["travel of the mass centre [m]", figures(loads.peak("travel"))],
     ]
     _tables.table(console, "Checks", ("", ""), rows)  # type: ignore[arg-type]
 
@@ -80,7 +73,7 @@ def _write(
 
     columns = _output.motion_columns(chain, trajectory) + _output.load_columns(chain, loads)
     files = [_output.write_columns(folder / "loads.csv", columns)]
-    files += viz.plots.save(_output.figures(chain, trajectory, loads, motion), folder, overwrite=overwrite)  # type: ignore[arg-type]
+    files += viz.plots.save(_output.all_figures(chain, trajectory, loads, motion), folder, overwrite=overwrite)  # type: ignore[arg-type]
     shown = [viz.Shown(chain, trajectory, loads)]
     files.append(viz.html(folder / "animation.html", shown, title=chain.name, overwrite=overwrite))
     return files

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, figures
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
@@ -111,8 +112,10 @@ def _scored(chain: ClosedChain, trajectory: Trajectory, designs: Array, terms: t
 def _print(chain: ClosedChain, scores: Scores, terms: tuple[str, ...], best: int) -> None:
     first = scores[terms[0]]
     order = np.argsort(first, kind="stable")[:best]
-    rows = [[f"{k}", *(f"{scores[term][k]:.6g}" for term in terms)] for k in order]
+    picked = {f"{k}": [float(scores[term][k]) for term in terms] for k in order}
     if len(scores):
-        rows.append(["median", *(f"{np.median(scores[term]):.6g}" for term in terms)])
+        picked["median"] = [float(np.median(scores[term])) for term in terms]
+    scales = [scores.scales[term] for term in terms]
+    rows = [[name, *map(partial(figures, digits=6), values, scales)] for name, values in picked.items()]
     title = f"{chain.name}: {len(scores)} designs, smallest {terms[0]} first (SI units)"
     _tables.table(_tables.console(), title, ("design", *terms), rows)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fivebar_pin._arrays import figures
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.simulation import energy_balance, simulate
@@ -50,10 +51,10 @@ def run(chosen: argparse.Namespace) -> int:
         )
     balance = energy_balance(chain, trajectory, torque=chosen.torque)
     rows = [
-        ["closure residual [m or rad]", _tables.number(trajectory.worst_closure)],
-        ["fastest joint [rad/s or m/s]", _tables.number(float(np.abs(trajectory.v).max()))],
-        ["change of total energy, relative", _tables.number(balance.drift())],
-        ["supplied power against rate of energy, relative", _tables.number(balance.residual())],
+        ["closure residual [m or rad]", figures(trajectory.worst_closure)],
+        ["fastest joint [rad/s or m/s]", figures(float(np.abs(trajectory.v).max()))],
+        ["change of total energy, relative", figures(balance.drift())],
+        ["supplied power against rate of energy, relative", figures(balance.residual())],
     ]
     _tables.table(console, f"{chain.name}: {chosen.time:g} s from rest", ("", ""), rows)
     if folder is not None:

@@ -91,6 +91,8 @@ def _solve(
         reach2=np.empty(n),
         force=np.zeros((3, n)),
         moment=np.zeros((3, n)),
+        frame_force=np.zeros((3, n)),
+        frame_moment=np.zeros((3, n)),
         com=np.zeros((3, n)),
     )
     load = _Coefficients.of(linkage, g)
@@ -109,7 +111,8 @@ def _solve(
         out.angles[1:3] = unwrapped(out.angles[1:3])
     f = out.forces.view(np.float64).reshape(5, n, 2).transpose(1, 0, 2)
     arrays = [x.T for x in (out.angles, out.rates, out.accelerations)]
-    arrays += [out.partials.transpose(2, 0, 1), out.torque.T, f, out.force.T, out.moment.T, out.com.T]
+    arrays += [out.partials.transpose(2, 0, 1), out.torque.T, f, out.force.T, out.moment.T]
+    arrays += [out.frame_force.T, out.frame_moment.T, out.com.T]
     for array in arrays:
         array.setflags(write=False)
     return Solution(linkage, mode, t, *arrays)
@@ -128,6 +131,8 @@ class _Rows:
     reach2: Array
     force: Array
     moment: Array
+    frame_force: Array
+    frame_moment: Array
     com: Array
 
 
@@ -168,8 +173,16 @@ def _move(b: CArray, X: Array, driven: tuple[Array, Array, Array], out: _Rows, s
 
 
 def _load(k: _Coefficients, b: CArray, X: Array, out: _Rows, s: slice) -> None:
-    """Fill torques, joint forces, shaking force and moment and the mass centre of one block."""
+    """Fill torques, joint forces, what shakes the frame and what it carries, and the mass centre of one block."""
     e, p, n = _inertia_loads(k, b, out.rates[:, s], out.accelerations[:, s])
+    force, moment = out.force[:, s], out.moment[:, s]
+    pull = (k.first * e).sum(axis=0)
+    np.negative(pull.real, out=force[0])  # F = -m c''
+    np.negative(pull.imag, out=force[1])
+    # M_O = -sum of the moments about the joints of the tree and of the forces there: O1, O2, O4, O0
+    carried = np.conj(b[0]) * p[1] + np.conj(b[3]) * p[2]
+    moment[2] = -(n.sum(axis=0) + carried.imag + k.a5 * (p[2] + p[3]).imag)
+    _add_weight(k, b, p, n)
     f01, f12, f23, f34, f40 = f = out.forces[:, s]
     np.multiply(b[1], n[2], out=f23)  # Im(conj(b2) f23) = -n2, Im(conj(b3) f23) = n3
     f23 += b[2] * n[1]
@@ -182,26 +195,40 @@ def _load(k: _Coefficients, b: CArray, X: Array, out: _Rows, s: slice) -> None:
     tau = out.torque[:, s]
     np.add(n[0], turn[0], out=tau[0])  # (22a) of links 1 and 4
     np.subtract(n[3], turn[1], out=tau[1])
-    gx, gy, gz = k.gravity
-    com, force, moment = out.com[:, s], out.force[:, s], out.moment[:, s]
+    com = out.com[:, s]
     # not first @ b: on a busy machine threaded BLAS makes four rows wait for a core
-    centre, pull = (k.first * b).sum(axis=0), (k.first * e).sum(axis=0)
+    centre = (k.first * b).sum(axis=0)
     centre += k.m_fixed
     np.divide(centre.real, k.mass, out=com[0])
     np.divide(centre.imag, k.mass, out=com[1])
-    np.subtract(k.mass * gx, pull.real, out=force[0])  # F = -m c'' + m g
-    np.subtract(k.mass * gy, pull.imag, out=force[1])
+    _fill_frame(k, f40, tau, out, s)
+
+
+def _fill_frame(k: _Coefficients, f40: CArray, tau: Array, out: _Rows, s: slice) -> None:
+    """Fill what the frame carries: the moment from its reactions f40, -tau1, -tau4, out of the plane the weight."""
+    weight = [k.mass * g for g in k.gravity]
+    force, moment, com = out.frame_force[:, s], out.frame_moment[:, s], out.com[:, s]
+    for axis in range(3):
+        np.add(out.force[axis, s], weight[axis], out=force[axis])
     np.multiply(f40.imag, k.a5, out=moment[2])
     moment[2] -= tau[0]
     moment[2] -= tau[1]
-    if gz != 0.0:
-        force[2] = k.mass * gz
-        np.multiply(com[1], k.mass * gz, out=moment[0])
-        np.multiply(com[0], -k.mass * gz, out=moment[1])
+    if weight[2] != 0.0:
+        np.multiply(com[1], weight[2], out=moment[0])
+        np.multiply(com[0], -weight[2], out=moment[1])
+
+
+def _add_weight(k: _Coefficients, b: CArray, p: CArray, n: Array) -> None:
+    """Take the weight of the links out of p and its moments out of n, in place."""
+    gx, gy, _ = k.gravity
+    if gx != 0.0 or gy != 0.0:
+        g = complex(gx, gy)
+        p -= np.array(k.masses)[:, None] * g
+        n -= (np.conj(b * k.mK) * g).imag
 
 
 def _inertia_loads(k: _Coefficients, b: CArray, rates: Array, accelerations: Array) -> tuple[CArray, CArray, Array]:
-    """Return e = b'' (4, n) [m/s2], p (4, n) [N] and n (4, n) [N m] as the module's head defines them."""
+    """Return e = b'' (4, n) [m/s2], and p (4, n) [N] and n (4, n) [N m] of the module's head without gravity."""
     beta = np.empty_like(b)
     np.multiply(rates, rates, out=beta.real)
     np.negative(beta.real, out=beta.real)
@@ -210,9 +237,6 @@ def _inertia_loads(k: _Coefficients, b: CArray, rates: Array, accelerations: Arr
     p = e * k.mK
     p[1] += k.masses[1] * e[0]
     p[2] += k.masses[2] * e[3]
-    gx, gy, _ = k.gravity
-    if gx != 0.0 or gy != 0.0:
-        p -= np.array(k.masses)[:, None] * complex(gx, gy)
     n = (np.conj(b) * p * k.K).imag
     n += k.inertias * accelerations
     return e, p, n

@@ -114,6 +114,8 @@ def _pick(solution: Solution, index: Array | np.ndarray[tuple[int], np.dtype[np.
             "joint_forces",
             "shaking_force",
             "shaking_moment",
+            "frame_force",
+            "frame_moment",
             "com",
         )
     }

@@ -28,8 +28,9 @@ class Solution:
         partials: d(theta, phi)/d(psi, gamma) (n, 2, 2) [-].
         torque: of the motors at O1 on link 1 and at O0 on link 4 (n, 2) [N m].
         joint_forces: f01, f12, f23, f34, f40 (n, 5, 2) [N]; f_ij by link i on link j, f40 by link 4 on the frame.
-        shaking_force: of the mechanism on the frame (n, 3) [N].
-        shaking_moment: of the mechanism on the frame about O1, the world origin, motor reactions included (n, 3) [N m].
+        shaking_force: -dp/dt, of the links' inertia on the frame (n, 3) [N].
+        shaking_moment: -dH/dt about O1, the world origin (n, 3) [N m].
+        frame_force, frame_moment: the same with the weight: all that the frame carries (n, 3) [N, N m].
         com: mass centre of the linkage (n, 3) [m].
     """
 
@@ -44,6 +45,8 @@ class Solution:
     joint_forces: Array
     shaking_force: Array
     shaking_moment: Array
+    frame_force: Array
+    frame_moment: Array
     com: Array
 
     def __repr__(self) -> str:
@@ -75,9 +78,11 @@ class Solution:
 
     @cached_property
     def closure_residual(self) -> Array:
-        """How far the loop (1) stays open, from the angles alone (n,) [m]."""
-        b = self.linkage.lengths[:4] * np.exp(1j * self.angles)
-        return np.asarray(np.abs(b[:, 0] + b[:, 1] - self.linkage.lengths[4] - b[:, 3] - b[:, 2]))
+        """How far the loop (1) stays open, the larger component along and across link 2, from the angles (n,) [m]."""
+        turn = np.exp(1j * self.angles)
+        b = self.linkage.lengths[:4] * turn
+        gap = (b[:, 0] + b[:, 1] - self.linkage.lengths[4] - b[:, 3] - b[:, 2]) * turn[:, 1].conj()
+        return np.asarray(np.maximum(np.abs(gap.real), np.abs(gap.imag)))
 
     @cached_property
     def energy(self) -> Array:

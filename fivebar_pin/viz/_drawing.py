@@ -60,6 +60,7 @@ class Drawing:
         chain: the mechanism.
         poses: where its bodies are.
         force: shaking force (n, 3) [N], or None.
+        frame_force: (n, 3) [N], where weight or applied forces act; or None.
         view: axes of the picture.
         keys: samples that become keyframes (k,).
         times: playing times of the keyframes (k,) [s].
@@ -71,6 +72,7 @@ class Drawing:
     chain: ClosedChain
     poses: Poses
     force: Array | None
+    frame_force: Array | None
     view: View
     keys: npt.NDArray[np.intp]
     times: Array

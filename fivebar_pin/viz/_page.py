@@ -65,14 +65,16 @@ def render(title: str, scene: Mapping[str, Any], *, live: bool = False) -> str:
 
 
 def _label(name: str, drawing: Drawing, box: Array, stage: Stage) -> dict[str, Any]:
-    """Return the words below a mechanism, where they stand, and the force that runs with the time."""
+    """Return the words below a mechanism, where they stand, and the forces that run with the time."""
     front = 0.5 * (box[0, 2] + box[1, 2]) if stage.view.planar else box[1, 2]
     below = np.array([0.5 * (box[0, 0] + box[1, 0]), stage.low[1], front])
-    label: dict[str, Any] = {"text": name, "at": [float(x) for x in stage.seen(below)], "times": [], "force": []}
-    if drawing.force is not None:
-        label["times"] = [float(t) for t in drawing.times]
-        label["force"] = [float(f"{x:.4g}") for x in np.linalg.norm(drawing.force[drawing.keys], axis=1)]
-        label["peak"] = float(np.max(np.linalg.norm(drawing.force, axis=1)))
+    label: dict[str, Any] = {"text": name, "at": [float(x) for x in stage.seen(below)], "times": [], "forces": []}
+    label["times"] = [float(t) for t in drawing.times]
+    for words, force in (("shaking force", drawing.force), ("frame force", drawing.frame_force)):
+        if force is not None:
+            size = np.linalg.norm(force, axis=1)
+            values = [float(f"{x:.4g}") for x in size[drawing.keys]]
+            label["forces"].append({"text": words, "values": values, "peak": float(np.max(size))})
     return label
 
 

@@ -8,13 +8,14 @@ global state of pyplot alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked
+from fivebar_pin._arrays import Array, checked, figures, settled
 from fivebar_pin.errors import InvalidInputError, OutputError
 
 if TYPE_CHECKING:
@@ -24,10 +25,12 @@ if TYPE_CHECKING:
     from fivebar_pin.dynamics import Loads
     from fivebar_pin.motion import Motion
 
-__all__ = ["com", "forces", "motion", "save", "shaking", "torques"]
+__all__ = ["com", "forces", "frame", "motion", "save", "shaking", "torques"]
 
 _T = TypeVar("_T")
 
+_VISIBLE = 1e-9
+"""Share of the largest component below which another one cannot be seen [-]."""
 _STYLES = (
     ("#D55E00", "-", 2.0),
     ("#0072B2", "--", 2.0),
@@ -81,7 +84,7 @@ def torques(
     """
     series = _series("torque", loads, lambda one: one.torque, t, (len(names),))
     panels = [f"torque at {name} [{unit}]" for name in names]
-    return _over_time(title, panels, series, t)
+    return _over_time(title, panels, series, t, [_scale("torque", loads)] * len(panels))
 
 
 def shaking(loads: Mapping[str, Loads], *, t: npt.ArrayLike, title: str = "Shaking force and moment") -> Figure:
@@ -92,15 +95,26 @@ def shaking(loads: Mapping[str, Loads], *, t: npt.ArrayLike, title: str = "Shaki
         t: times (n,) [s].
         title: what the figure is called.
     """
-    force = _series("shaking_force", loads, lambda one: one.shaking_force, t, (3,))
-    moment = _series("shaking_moment", loads, lambda one: one.shaking_moment, t, (3,))
-    panels, columns = [], []
-    for word, unit, series in (("force", "N", force), ("moment", "N m", moment)):
-        for axis in _present(series):
-            panels.append(f"shaking {word} {'xyz'[axis]} [{unit}]")
+    return _on_frame("shaking", loads, t, title)
+
+
+def frame(loads: Mapping[str, Loads], *, t: npt.ArrayLike, title: str = "What the frame carries") -> Figure:
+    """Plot the frame force and moment, weight and applied forces among them, over time; arguments as for `shaking`."""
+    return _on_frame("frame", loads, t, title)
+
+
+def _on_frame(what: str, loads: Mapping[str, Loads], t: npt.ArrayLike, title: str) -> Figure:
+    panels, columns, scales = [], [], []
+    for word, unit in (("force", "N"), ("moment", "N m")):
+        name = f"{what}_{word}"
+        series = _series(name, loads, attrgetter(name), t, (3,))
+        scale = _scale(name, loads)
+        for axis in _present(series, scale):
+            panels.append(f"{what} {word} {'xyz'[axis]} [{unit}]")
             columns.append({label: values[:, axis] for label, values in series.items()})
+            scales.append(scale)
     stacked = {label: np.stack([column[label] for column in columns], axis=1) for label in loads}
-    return _over_time(title, panels, stacked, t)
+    return _over_time(title, panels, stacked, t, scales)
 
 
 def forces(
@@ -123,7 +137,8 @@ def forces(
     for label, values in _some(forces).items():
         vectors = checked(f"forces of {label}", values, (n, len(names), None))
         series[label] = np.linalg.norm(vectors, axis=2)
-    return _over_time(title, [f"|{name}| [N]" for name in names], series, t)
+    largest = max(float(values.max(initial=0.0)) for values in series.values())
+    return _over_time(title, [f"|{name}| [N]" for name in names], series, t, [largest] * len(names))
 
 
 def com(loads: Mapping[str, Loads], *, title: str = "Path of the total mass centre") -> Figure:
@@ -141,8 +156,7 @@ def com(loads: Mapping[str, Loads], *, title: str = "Path of the total mass cent
     figure, (ax,) = _sheet(1, 1, title, height=5.5)
     for k, (label, path) in enumerate(paths.items()):
         colour, dash, width = _STYLES[k % len(_STYLES)]
-        size = float(np.linalg.norm(path - path[0], axis=1).max())
-        words = f"{label}: travel {1e3 * size:.3g} mm"
+        words = f"{label}: travel {figures(1e3 * loads[label].peak('travel'), digits=3)} mm"
         ax.plot(1e3 * path[:, i], 1e3 * path[:, j], color=colour, linestyle=dash, linewidth=width, label=words)
         ax.plot(1e3 * path[0, i], 1e3 * path[0, j], marker="o", color=colour, markersize=7, linestyle="none")
     ax.set_xlabel(f"{'xyz'[i]} [mm]")
@@ -184,8 +198,10 @@ def save(figures: Mapping[str, Figure], folder: str | Path, *, overwrite: bool =
     return paths
 
 
-def _over_time(title: str, panels: Sequence[str], series: Mapping[str, Array], t: npt.ArrayLike) -> Figure:
-    """Plot columns of (n, panels) arrays, a panel each, a curve per label."""
+def _over_time(
+    title: str, panels: Sequence[str], series: Mapping[str, Array], t: npt.ArrayLike, scales: Sequence[float]
+) -> Figure:
+    """Plot columns of (n, panels) arrays, a panel each, a curve per label; scales tell what is round-off in each."""
     times = checked("t", t, (None,))
     columns = 1 if len(panels) <= 3 else 2
     rows = -(-len(panels) // columns)
@@ -194,7 +210,7 @@ def _over_time(title: str, panels: Sequence[str], series: Mapping[str, Array], t
         for number, (label, values) in enumerate(series.items()):
             _draw(ax, times, values[:, k], label, number)
         ax.set_ylabel(panel)
-        _show_round_off(ax, [values[:, k] for values in series.values()])
+        _show_round_off(ax, [values[:, k] for values in series.values()], scales[k])
     for ax in axes[len(panels) :]:
         ax.set_visible(False)
     for ax in axes[max(len(panels) - columns, 0) : len(panels)]:
@@ -205,10 +221,10 @@ def _over_time(title: str, panels: Sequence[str], series: Mapping[str, Array], t
     return figure
 
 
-def _show_round_off(ax: Axes, curves: Sequence[Array]) -> None:
+def _show_round_off(ax: Axes, curves: Sequence[Array], scale: float) -> None:
     """Keep an axis of nothing but zeros from being blown up."""
     largest = max(float(np.max(np.abs(c))) for c in curves)
-    if largest < 1e-12:
+    if settled(largest, scale) == 0.0:
         ax.set_ylim(-1.0, 1.0)
 
 
@@ -238,10 +254,16 @@ def _series(
     return {label: checked(f"{name} of {label}", pick(one), (n, *tail)) for label, one in _some(loads).items()}
 
 
-def _present(series: Mapping[str, Array]) -> list[int]:
-    """Return the components that are more than round-off in any of the mechanisms; x where none is."""
+def _scale(name: str, loads: Mapping[str, Loads]) -> float:
+    """Return the largest sum of the sizes of what adds up to a quantity of any mechanism."""
+    return max(one.scale(name) for one in loads.values())
+
+
+def _present(series: Mapping[str, Array], scale: float) -> list[int]:
+    """Return the components that can be seen in any of the mechanisms, beyond round-off; x where none can."""
     peaks = np.max([np.max(np.abs(values), axis=0) for values in series.values()], axis=0)
-    return [int(k) for k in np.flatnonzero(peaks > 1e-9 * max(float(peaks.max()), 1e-12))] or [0]
+    seen = [k for k, x in enumerate(peaks) if settled(float(x), scale) and x > _VISIBLE * peaks.max()]
+    return seen or [0]
 
 
 def _some(mapping: Mapping[str, _T]) -> Mapping[str, _T]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked
+from fivebar_pin._arrays import ROUND_OFF, Array, checked
 from fivebar_pin.errors import InvalidInputError, OutputError
 from fivebar_pin.trajectory import Trajectory
 from fivebar_pin.viz._drawing import Drawing, reach, safe
@@ -40,7 +40,8 @@ class Shown:
     Attributes:
         chain: the mechanism.
         trajectory: how it moves; times and configurations are used.
-        loads: its loads; the shaking force is drawn as an arrow. Without them there is no arrow.
+        loads: its loads; the shaking force is drawn as an arrow, and told beside the frame force where weight or
+            applied forces act. Without them there is no arrow.
         label: what is written below it; the chain's name unless given.
     """
 
@@ -121,14 +122,12 @@ def page(
 def _drawings(shown: Sequence[Shown], speed: float, spheres_by_mass: bool) -> list[Drawing]:
     """Return what is drawn of each mechanism: one clock, one size and one scale of forces for all."""
     everything = [compute_poses(s.chain, s.trajectory) for s in shown]
-    forces = [_force(s, len(p.t)) for s, p in zip(shown, everything, strict=True)]
+    forces = [_force(s, "shaking_force", len(p.t)) for s, p in zip(shown, everything, strict=True)]
     views = [find_view(s.chain, s.trajectory.q[0]) for s in shown]
     view = views[0] if all(v.planar for v in views) else View(views[0].right, views[0].up, planar=False)
     size = max(float(np.linalg.norm(np.ptp(reach(s.chain, p), axis=0))) for s, p in zip(shown, everything, strict=True))
     size = size if size > 0.0 else 1.0
-    real = [float(np.max(np.linalg.norm(f, axis=1))) for f in forces if f is not None]
-    largest = max(real, default=0.0)
-    notable = largest > max(_round_off(s) for s in shown)
+    largest = max((float(np.max(np.linalg.norm(f, axis=1))) for f in forces if f is not None), default=0.0)
     start = min(float(p.t[0]) for p in everything)
     heaviest = max(float(i.mass) for s in shown for i in s.chain.model.inertias) if spheres_by_mass else 0.0
     drawings = []
@@ -139,10 +138,11 @@ def _drawings(shown: Sequence[Shown], speed: float, spheres_by_mass: bool) -> li
                 chain=s.chain,
                 poses=poses,
                 force=force,
+                frame_force=_force(s, "frame_force", len(poses.t)) if s.loads is not None and s.loads.loaded else None,
                 view=view,
                 keys=keys,
                 times=(poses.t[keys] - start) / speed,
-                arrow=_ARROW * size / largest if notable else 0.0,
+                arrow=_ARROW * size / largest if largest > 0.0 else 0.0,
                 size=size,
                 mass_unit=heaviest,
             )
@@ -150,17 +150,13 @@ def _drawings(shown: Sequence[Shown], speed: float, spheres_by_mass: bool) -> li
     return drawings
 
 
-def _force(shown: Shown, samples: int) -> Array | None:
+def _force(shown: Shown, name: str, samples: int) -> Array | None:
+    """Return a force (n, 3) [N] of the loads by name, zero where it is only round-off; None without loads."""
     if shown.loads is None:
         return None
-    return checked("loads.shaking_force", shown.loads.shaking_force, (samples, 3))
-
-
-def _round_off(shown: Shown) -> float:
-    """Return a force [N] below which a shaking force is nothing but round-off."""
-    v, a = (float(np.max(np.abs(x), initial=0.0)) for x in (shown.trajectory.v, shown.trajectory.a))
-    gravity = float(np.linalg.norm(shown.chain.model.gravity.linear))
-    return 1e-9 * shown.chain.mass * (gravity + shown.chain.length * (a + v * v))
+    force = checked(f"loads.{name}", getattr(shown.loads, name), (samples, 3))
+    real = np.linalg.norm(force, axis=1) > ROUND_OFF * shown.loads.scale(name)
+    return np.asarray(force * real[:, None])
 
 
 def _keyframes(t: Array, speed: float) -> npt.NDArray[np.intp]:
