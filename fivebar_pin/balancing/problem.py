@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
-from fivebar_pin.balancing import _lift
+from fivebar_pin.balancing import _empty, _lift
 from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing._objective import TermMaker, weights_of
 from fivebar_pin.balancing._parameters import Space
@@ -52,6 +52,7 @@ class BalanceProblem:
         space: the parameters of the problem.
         mode: "add" or "redesign".
         materials: pieces of material that are variables.
+        gone: for each of them, whether the conditions leave none of it.
         terms: objectives by base name.
         rows: quantities along the motions.
         limits: upper bounds, as given.
@@ -69,6 +70,7 @@ class BalanceProblem:
     space: Space
     mode: str
     materials: tuple[Material, ...]
+    gone: tuple[bool, ...]
     terms: dict[str, Term]
     rows: dict[str, Rows]
     limits: dict[str, npt.ArrayLike]
@@ -203,7 +205,7 @@ class BalanceProblem:
         A = np.concatenate([B @ self.E, self.fixed[:, :-1]])
         b = np.concatenate([B @ self.X0, -self.fixed[:, -1]])
         mass = np.array([abs(float(y[m.start])) for m in self.materials])
-        share = np.where(mass < drop, 0.0, np.maximum(mass, 1e-9))
+        share = np.where((mass < drop) | np.array(self.gone), 0.0, np.maximum(mass, 1e-9))
         share = np.repeat(share, [m.size for m in self.materials])
         y = np.where(share > 0.0, y, 0.0)
         for _ in range(3 if A.size else 0):
@@ -278,6 +280,8 @@ def balance_problem(
     maker = TermMaker(chain, setup, rows, paths, E, X0, full_E, full_0)
     terms = {name: maker.make(name) for name in names}
     blocks = setup.constraints(materials, E, X0, masses) + maker.limits(limits or {})
+    gone = _empty.empty(blocks, materials, n)
+    blocks = _empty.without(blocks, materials, gone, n)
     return BalanceProblem(
         chain=chain,
         kind=kind,
@@ -285,6 +289,7 @@ def balance_problem(
         space=own,
         mode=mode,
         materials=tuple(materials),
+        gone=gone,
         terms=terms,
         rows=rows,
         limits=dict(limits or {}),
