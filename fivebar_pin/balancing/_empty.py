@@ -20,7 +20,7 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing.solvers import Block
-from fivebar_pin.balancing.solvers.program import outside
+from fivebar_pin.balancing.solvers.cones import outside
 
 _ZERO = 1e-9  # coefficient of a condition that counts as none [scaled, rows of unit size]
 
@@ -81,21 +81,20 @@ def _vanishing(rows: Array, constants: Array, free: int) -> tuple[bool, ...]:
     bounds = [(None, None)] * free + [(0.0, None)] * (k - free) + [(0.0, 1.0)] * count
     cost = np.concatenate([np.zeros(k), -np.ones(count)])
     found = linprog(cost, A_ub=A, b_ub=np.zeros(count), A_eq=total, b_eq=[0.0], bounds=bounds)
-    if found.x is None:
-        return (False,) * count
-    return tuple(bool(w > 0.5) for w in found.x[k:])
+    held = np.zeros(count) if found.x is None else np.asarray(found.x, dtype=np.float64)[k:]
+    return tuple(bool(w > 0.5) for w in held)
 
 
 def _kept_rows(block: Block) -> list[Block]:
     """Return a block of single rows without those that say nothing any more."""
-    said = (np.abs(block.G).max(axis=1, initial=0.0) > 0.0) | ~_holds(block)
+    said = np.logical_or(np.abs(block.G).max(axis=1, initial=0.0) > 0.0, np.logical_not(_holds(block)))
     if not said.any():
         return []
     label = block.label
     if not isinstance(label, str):
         label = tuple(name for name, kept in zip(label, said, strict=True) if kept)
     inward = None if block.inward is None else block.inward[said]
-    return [Block(label, block.cone, block.G[said], block.g[said], inward)]
+    return [Block(label, block.cone, block.G[said], block.g[said], inward, block.soft)]
 
 
 def _holds(block: Block) -> Array:

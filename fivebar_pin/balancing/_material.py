@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,9 +58,26 @@ class Material:
         """Return the cones for a problem with n variables."""
         out = [Block(f"{self.label} is a physical body", *self._physical(), np.zeros(0))]
         if self.shape is not None:
-            out.append(Block(f"{self.label} stays in its region", "nonneg", -self._region(self.shape), np.zeros(0)))
+            out.append(
+                Block(f"{self.label} stays in its region", "nonneg", -self._region(self.shape), np.zeros(0), soft=True)
+            )
         placed = [self._placed(block, n) for block in out]
         return placed if self.solid is None else placed + [self._placed(b, n) for b in self._disc(self.solid)]
+
+    def sizes(self, heaviest: float) -> Array:
+        """Return bounds on all variables (size,) that follow from a bound on the mass.
+
+        With R the radius about the origin that holds the region in the mean square, |h| <= R m and every second moment
+        and inertia is at most R^2 m; so is the part u of the inertia of a disc.
+        """
+        R = np.inf
+        if self.shape is not None:
+            semi = self.shape.semi_axes
+            spread = np.linalg.norm(semi) if self.shape.kind == "box" else semi.max()
+            R = float(np.linalg.norm(self.shape.center) + spread)
+        first = 2 if self.planar else 3
+        orders = np.concatenate([[0.0], np.ones(first), np.full(self.size - 1 - first, 2.0)])
+        return np.asarray(heaviest * R**orders if heaviest > 0.0 else np.zeros(self.size))
 
     def anchor(self, length: float = 0.3) -> Array:
         """Return the variables (size,) of a unit mass spread well inside the region."""
@@ -82,8 +99,8 @@ class Material:
         G = np.zeros((block.G.shape[0], n))
         G[:, self.start : self.start + self.size] = block.G
         if block.g.size:
-            return Block(block.label, block.cone, G, block.g, block.inward)
-        return Block(block.label, block.cone, G, np.zeros(G.shape[0]), block.G @ self.anchor())
+            return replace(block, G=G)
+        return replace(block, G=G, g=np.zeros(G.shape[0]), inward=block.G @ self.anchor())
 
     def _unit(self, k: int) -> Array:
         e = np.zeros(self.size)

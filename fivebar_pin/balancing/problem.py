@@ -31,16 +31,32 @@ from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, po
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.regions import Disc, Region
-from fivebar_pin.balancing.solvers import Block, Certificate, Outcome, Program, solve
+from fivebar_pin.balancing.solvers import DEFAULT, Block, Certificate, Outcome, Program, solve, solver_named
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError, UnknownNameError
 
 __all__ = ["BalanceProblem", "balance_problem"]
 
-_MARGINS = (1e-9, 1e-8, 1e-7, 0.0)  # how far inside the cones a design is kept, as a share of the moving mass
+_MARGINS = (1e-9, 1e-8, 1e-7, 1e-6)  # how far inside the cones a design is kept, as a share of the moving mass
+_GIVE = ((1e-9, 1e-8), (1e-8, 1e-7))  # margin, and how far regions give way where nothing else is left, the same
 _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
 _PHYSICAL = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """One objective over a problem: a program, its cost in units, what that stands for, and who solves it."""
+
+    program: Program
+    P: Array
+    q: Array
+    unit: float
+    weights: Mapping[str, float]
+    solver: str
+
+    def solve(self, *, margin: float = 0.0, give: float = 0.0) -> Outcome:
+        return solve(self.program, self.P, self.q, margin=margin, give=give, solver=self.solver)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -61,7 +77,9 @@ class BalanceProblem:
         fixed: rows (k, n + 1) of masses that are given exactly.
         caps: bounds on added masses that have none of their own.
         mass: unit of mass [kg].
+        sizes: bounds on the variables (n,) that follow from those on masses and the regions.
         near: configuration (nq,) of the one branch that is balanced, or None.
+        solver: name of the solver.
     """
 
     chain: ClosedChain
@@ -80,7 +98,9 @@ class BalanceProblem:
     fixed: Array = field(repr=False)
     caps: tuple[Block, ...] = field(repr=False)
     mass: float
+    sizes: Array = field(repr=False)
     near: Array | None
+    solver: str = DEFAULT
 
     @property
     def n(self) -> int:
@@ -92,14 +112,25 @@ class BalanceProblem:
         scale = self.terms[base(objective)].scale
         return scale * scale if objective.startswith("mean_square_") else scale
 
-    def solve(self, minimise: str | Mapping[str, float], *, limits: Mapping[str, float] | None = None) -> Design:
+    def solve(
+        self,
+        minimise: str | Mapping[str, float],
+        *,
+        limits: Mapping[str, float] | None = None,
+        solver: str | None = None,
+    ) -> Design:
         """Solve for other weights, or further upper bounds, of the prepared objectives.
 
+        Args:
+            minimise, limits: as for `balance`.
+            solver: one of `solvers.SOLVERS`; the one the problem was prepared for unless given.
+
         Raises:
-            UnknownNameError: an objective that was not prepared.
+            UnknownNameError: an objective that was not prepared, or a solver that there is not.
             SolverError: no solution to the tolerance and no proof either.
         """
         weights = weights_of(minimise, self.mode)
+        solver = solver or self.solver
         for name in (*weights, *(limits or {})):
             if base(name) not in self.terms:
                 raise UnknownNameError("prepared objective", name, self.terms)
@@ -109,32 +140,59 @@ class BalanceProblem:
             for block in self.terms[base(name)].bounded(positive_limit(name, top))
         ]
         bounds = [*self.program.blocks, *limited]
-        P, q, unit, epigraphs = self._objective(weights)
-        program = Program(P.size, [*bounds, *self.caps, *epigraphs])
-        problem = ""
+        P, q, unit, epigraphs, sizes = self._objective(weights)
+        program = Program(P.size, [*bounds, *self.caps, *epigraphs], sizes)
+        asked = _Asked(program, P, q, unit, weights, solver)
+        design = self._inside(asked)
+        if design is not None:
+            return design
+        outcome = asked.solve()
+        if outcome.x is None:
+            return self._infeasible(self._proof(bounds, solver) or outcome.certificate)
+        design, problem = self._finish(outcome, asked)
+        return design or self._on_the_boundary(asked, problem)
+
+    def _inside(self, asked: _Asked) -> Design | None:
+        """Return the design that is kept a hair inside the cones, by the least margin that makes it physical."""
         for margin in _MARGINS:
-            outcome = solve(program, P, q, margin=margin)
+            try:
+                outcome = asked.solve(margin=margin)
+            except SolverError:
+                return None  # to be tried on the boundary, where it says why if it fails again
             if outcome.x is None:
-                outcome = solve(program, P, q)
-                if outcome.x is None:
-                    return self._infeasible(self._proof(bounds) or outcome.certificate)
-            design, problem = self._finish(outcome, program, weights, (P, unit))
+                return None
+            design, _ = self._finish(outcome, asked)
             if design is not None:
                 return design
+        return None
+
+    def _on_the_boundary(self, asked: _Asked, problem: str) -> Design:
+        """Return a design where bodies are points or sheets on the boundary of their regions, which give way by a hair.
+
+        Raises:
+            SolverError: there is none either.
+        """
+        for margin, give in _GIVE:
+            outcome = asked.solve(margin=margin, give=give)
+            if outcome.x is not None:
+                design, problem = self._finish(outcome, asked)
+                if design is not None:
+                    return design
         raise SolverError(
             f"neither a design nor a proof that there is none: the closest one {problem}. It may exist only where "
             "bodies shrink to points, or only as a limit. Loosen the bounds or the regions."
         )
 
-    def _proof(self, bounds: Sequence[Block]) -> Certificate | None:
+    def _proof(self, bounds: Sequence[Block], solver: str) -> Certificate | None:
         """Return a proof that does without the caps on masses, which says more, if there is one."""
         try:
-            return solve(Program(self.n, bounds), np.zeros(self.n), np.zeros(self.n)).certificate
+            nothing = np.zeros(self.n)
+            return solve(Program(self.n, bounds, self.sizes), nothing, nothing, solver=solver).certificate
         except SolverError:
             return None
 
-    def _objective(self, weights: Mapping[str, float]) -> tuple[Array, Array, float, list[Block]]:
-        """Return P, q over all variables, the unit they were divided by, and the epigraphs of the terms that count.
+    def _objective(self, weights: Mapping[str, float]) -> tuple[Array, Array, float, list[Block], Array]:
+        """Return P, q over all variables, the unit they were divided by, the epigraphs of the terms that count, bounds.
 
         Every such term gets one variable after those of the material.
         """
@@ -150,11 +208,10 @@ class BalanceProblem:
                     q[column] += weight * term.scale
         unit = float(max(P.max(initial=0.0), q.max(initial=0.0))) or 1.0
         blocks = [b for k, name in enumerate(used) for b in self.terms[name].epigraph(self.n + k)]
-        return P / unit, q / unit, unit, blocks
+        sizes = np.concatenate([self.sizes, [self.terms[name].largest(self.sizes) for name in used]])
+        return P / unit, q / unit, unit, blocks, sizes
 
-    def _finish(
-        self, outcome: Outcome, program: Program, weights: Mapping[str, float], cost: tuple[Array, float]
-    ) -> tuple[Design | None, str]:
+    def _finish(self, outcome: Outcome, asked: _Asked) -> tuple[Design | None, str]:
         """Make a solution exact and check it; None and the reason when it is not physical."""
         assert outcome.x is not None
         for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
@@ -167,12 +224,10 @@ class BalanceProblem:
                 f"misses the conditions by {residual:.2g} ({_EXACT:g} is allowed) and its least physical body by "
                 f"{max(0.0, -parts.lowest):.2g} ({_PHYSICAL:g})"
             )
+        weights = asked.weights
         values = {name: self.terms[base(name)].value(y) for name in weights}
         squared = {k: v * v if k.startswith("mean_square_") else v for k, v in values.items()}
         objective = sum(weights[k] * squared[k] for k in weights)
-        P, unit = cost
-        x = outcome.x
-        dual = unit * (-float(program.g @ outcome.z) - 0.5 * float(x @ (P * x)))
         design = Design(
             status="optimal",
             original=self.chain,
@@ -181,7 +236,7 @@ class BalanceProblem:
             space=self.space,
             conditions=self.conditions,
             objective=objective,
-            dual_bound=dual,
+            dual_bound=asked.unit * outcome.bound,
             terms=squared,
             parameters=frozen(parts.parameters),
             added=parts.added,
@@ -247,12 +302,14 @@ def balance_problem(
     near: npt.ArrayLike | None = None,
     space: SpaceName = "auto",
     seed: int = 0,
+    solver: str = DEFAULT,
 ) -> BalanceProblem:
     """Prepare a balancing problem for several objectives; arguments as for `balance`."""
     if kind is not None and kind not in KINDS:
         raise UnknownNameError("kind of balance", kind, KINDS)
     if mode not in ("add", "redesign"):
         raise UnknownNameError("mode", mode, ("add", "redesign"))
+    solver_named(solver)
     check_terms(tuple(objectives), "objective")
     check_terms(dict(limits or {}), "limit")
     point = checked("about", about, (3,))
@@ -282,6 +339,7 @@ def balance_problem(
     blocks = setup.constraints(materials, E, X0, masses) + maker.limits(limits or {})
     gone = _empty.empty(blocks, materials, n)
     blocks = _empty.without(blocks, materials, gone, n)
+    caps = tuple(setup.caps(materials, masses, n))
     return BalanceProblem(
         chain=chain,
         kind=kind,
@@ -297,7 +355,24 @@ def balance_problem(
         X0=frozen(X0),
         program=Program(n, blocks),
         fixed=frozen(setup.fixed(materials, masses, n)),
-        caps=tuple(setup.caps(materials, masses, n)),
+        caps=caps,
         mass=setup.mass,
+        sizes=frozen(_sizes(materials, gone, [*blocks, *caps], n)),
         near=None if near is None else checked("near", near, (chain.nq,)),
+        solver=solver,
     )
+
+
+def _sizes(materials: Sequence[Material], gone: Sequence[bool], blocks: Sequence[Block], n: int) -> Array:
+    """Return bounds on the variables (n,): the heaviest mass that single rows allow, and its moments."""
+    heaviest = np.full(n, np.inf)
+    for block in blocks:
+        if block.cone not in ("zero", "nonneg"):
+            continue
+        single = np.count_nonzero(block.G, axis=1) == 1
+        for row, offset in zip(block.G[single], block.g[single], strict=True):
+            k = int(np.argmax(row != 0.0))
+            if row[k] < 0.0 or block.cone == "zero":
+                heaviest[k] = min(heaviest[k], max(0.0, -offset / row[k]))
+    sizes = [np.zeros(m.size) if g else m.sizes(heaviest[m.start]) for m, g in zip(materials, gone, strict=True)]
+    return np.concatenate(sizes) if sizes else np.zeros(0)

@@ -12,6 +12,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.answer import Answer, Solver
+from fivebar_pin.balancing.solvers.bound import lower_bound
 from fivebar_pin.balancing.solvers.certificate import Certificate, certificate_of
 from fivebar_pin.balancing.solvers.program import Problem, Program
 from fivebar_pin.errors import SolverError, UnknownNameError
@@ -28,7 +29,8 @@ class Outcome:
 
     Attributes:
         x, z: primal (n,) and dual (rows,) solution.
-        objective, dual: values of the two problems.
+        objective, dual: values of the two problems, with the margin.
+        bound: what no objective without the margin is below, rigorously (see `bound`).
         certificate: proof of infeasibility.
     """
 
@@ -36,6 +38,7 @@ class Outcome:
     z: Array
     objective: float
     dual: float
+    bound: float
     certificate: Certificate | None
 
 
@@ -52,15 +55,22 @@ def solver_named(name: str) -> Solver:
 
 
 def solve(
-    program: Program, P: Array, q: Array, *, margin: float = 0.0, tolerance: float = 1e-8, solver: str = DEFAULT
+    program: Program,
+    P: Array,
+    q: Array,
+    *,
+    margin: float = 0.0,
+    give: float = 0.0,
+    tolerance: float = 1e-8,
+    solver: str = DEFAULT,
 ) -> Outcome:
-    """Solve for a diagonal P (n,) and q (n,), the cones tightened by a margin.
+    """Solve for a diagonal P (n,) and q (n,), the cones tightened by a margin, or soft bounds given way by `give`.
 
     Raises:
         SolverError: no solution to the tolerance and no valid certificate; a solver that is not installed.
         UnknownNameError: there is no such solver.
     """
-    problem = Problem(program, P, q, program.g - margin * program.inward)
+    problem = Problem(program, P, q, program.g - np.where(program.soft, margin - give, margin) * program.inward)
     failure = SolverError("the conic solver was not run")
     for answer in solver_named(solver)(problem, tolerance):
         try:
@@ -73,8 +83,8 @@ def solve(
 def _outcome(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
     """Check one answer, whatever the solver calls it."""
     if answer.kind == "infeasible":
-        certificate = certificate_of(problem.program, answer.z, problem.g, tolerance)
-        return Outcome(None, answer.z, float("nan"), float("nan"), certificate)
+        certificate = certificate_of(problem.program, answer.z, problem.g)
+        return Outcome(None, answer.z, float("nan"), float("nan"), float("inf"), certificate)
     if answer.kind == "unbounded":
         raise SolverError(
             "the objective can fall without bound: bound the region, the masses or choose another objective"
@@ -102,4 +112,4 @@ def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
             residual=worst,
             tolerance=tolerance,
         )
-    return Outcome(x, z, objective, dual, None)
+    return Outcome(x, z, objective, dual, lower_bound(problem.program, P, q, x, z), None)
