@@ -19,7 +19,7 @@ from fivebar_pin.errors import SolverError, UnknownNameError
 
 __all__ = ["DEFAULT", "SOLVERS", "Outcome", "solve", "solver_named"]
 
-SOLVERS = ("clarabel",)  # each is the module of this name beside this one, with its function `answers`
+SOLVERS = ("clarabel", "scipy")  # each is the module of this name beside this one, with its function `answers`
 DEFAULT = "clarabel"
 
 
