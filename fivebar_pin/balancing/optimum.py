@@ -17,6 +17,7 @@ from fivebar_pin.balancing.conditions import balance_conditions
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.problem import balance_problem
 from fivebar_pin.balancing.regions import Disc, Region
+from fivebar_pin.balancing.solvers import DEFAULT
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
 
@@ -41,6 +42,7 @@ def balance(
     near: npt.ArrayLike | None = None,
     space: SpaceName = "auto",
     seed: int = 0,
+    solver: str = DEFAULT,
 ) -> Design:
     """Find the globally optimal balanced design, or prove that there is none.
 
@@ -64,6 +66,7 @@ def balance(
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
         gravity, about, near, space, seed: as for `balance_conditions`.
+        solver: "clarabel", or "scipy", which shares nothing with it and takes some fifty times as long.
 
     Returns:
         The design; ask its `feasible`, `chain`, `certificate`. Special lengths (antiparallelograms, kites) may leave no
@@ -73,7 +76,7 @@ def balance(
         infeasible; other branches are listed as alternatives.
 
     Raises:
-        UnknownNameError: a kind, body, term or mode that does not exist.
+        UnknownNameError: a kind, body, term, mode or solver that does not exist.
         InvalidInputError: bounds that contradict themselves, bodies without influence, a mechanism that is not
             physical to begin with, terms without motions.
         SolverError: no solution to the tolerance and no proof either.
@@ -98,6 +101,7 @@ def balance(
             near=near,
             space=space,
             seed=seed,
+            solver=solver,
         )
         return problem.solve(terms)
 

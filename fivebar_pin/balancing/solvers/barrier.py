@@ -95,7 +95,9 @@ class SecondOrder(Barrier):
     @property
     def unit(self) -> Array:
         """Return the axis."""
-        return np.eye(1, self.rows.shape[1])[0]
+        e = np.zeros(self.rows.shape[1])
+        e[0] = 1.0
+        return e
 
     @property
     def scale(self) -> float:
@@ -133,7 +135,7 @@ class Semidefinite(Barrier):
     @property
     def unit(self) -> Array:
         """Return the identity."""
-        return _triangles(np.eye(self.order)[None])[0]
+        return np.asarray(_triangles(np.eye(self.order)[None])[0])
 
     def depth(self, s: Array) -> Array:
         """Return the smallest eigenvalues."""
@@ -143,7 +145,7 @@ class Semidefinite(Barrier):
         """Return L^-1 D L^-T."""
         inverse = np.linalg.inv(np.linalg.cholesky(_matrices(s, self.order)))[:, None]
         turned = inverse @ _matrices(np.moveaxis(D, 2, 1), self.order) @ np.swapaxes(inverse, 2, 3)
-        return np.moveaxis(_triangles(turned), 2, 1)
+        return np.asarray(np.moveaxis(_triangles(turned), 2, 1))
 
     def back(self, s: Array, V: Array) -> Array:
         """Return L^-T V L^-1."""

@@ -34,6 +34,9 @@ _OPEN = 1e-9  # residual of equalities that contradict each other, relative
 _CENTRED = 1e-3  # squared Newton decrement at which a stage ends
 _NEWTON = 60  # steps of one stage
 _STAGES = 120
+_GIVE = 1e-9  # width given to cones without an interior, scaled as the program
+_SURE = 1e-3  # gap of the search for a start at which its end is negative beyond doubt, relative
+_REFINED = 2  # corrections of z
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,24 +65,40 @@ class _Stage:
             out -= self.G[part.rows.ravel()].T @ part.back(s[part.rows], part.v).ravel()
         return np.asarray(out)
 
+    def rows(self, w: Array) -> Array:
+        """Return M G, whose M G^T M G is the Hessian of the barrier."""
+        s = self.g + self.G @ w
+        return np.concatenate([p.factor(s[p.rows], self.G[p.rows]).reshape(-1, w.size) for p in self.parts])
+
+    def back(self, w: Array, V: Array) -> Array:
+        """Return M^T V (rows,) for V in the order of `rows`."""
+        s, out, start = self.g + self.G @ w, np.zeros(self.g.size), 0
+        for part in self.parts:
+            end = start + part.rows.size
+            out[part.rows] = part.back(s[part.rows], V[start:end].reshape(part.rows.shape))
+            start = end
+        return out
+
     def step(self, w: Array, tau: float) -> tuple[Array, float]:
         """Return the Newton step (n,) and the squared decrement."""
-        s = self.g + self.G @ w
-        rows = [part.factor(s[part.rows], self.G[part.rows]).reshape(-1, w.size) for part in self.parts]
-        R = np.concatenate([*rows, np.sqrt(tau) * _root(self.P)])
+        R = np.concatenate([self.rows(w), np.sqrt(tau) * _root(self.P)])
         T = linalg.qr(R, mode="r", check_finite=False)[0][: w.size]
-        T[np.diag_indices(w.size)] += (T.diagonal() == 0.0) * 1.0
-        slope = self.slope(w, tau)
-        half = linalg.solve_triangular(T, -slope, trans=1, check_finite=False)
+        half = linalg.solve_triangular(T, -self.slope(w, tau), trans=1, check_finite=False)
         return np.asarray(linalg.solve_triangular(T, half, check_finite=False)), float(half @ half)
 
-    def dual(self, w: Array, dw: Array, tau: float, rows: int) -> Array:
-        """Return z (rows,) of the step dw at w."""
-        s, ds = self.g + self.G @ w, self.G @ dw
-        z = np.zeros(rows)
-        for part in self.parts:
-            moved = part.factor(s[part.rows], ds[part.rows][:, :, None])[:, :, 0]
-            z[part.rows] = part.back(s[part.rows], part.v - moved) / tau
+    def dual(self, w: Array, dw: Array, tau: float) -> Array:
+        """Return z (rows,) of the step dw at w.
+
+        Near the end of the path g + G w is known to few digits, and P (w + dw) + q = G^T z holds to few. The smallest
+        change of z, measured by M, mends that; the cones hardly notice it.
+        """
+        R = self.rows(w)
+        v = np.concatenate([part.v.ravel() for part in self.parts])
+        z = self.back(w, v - R @ dw) / tau
+        Q, T = linalg.qr(R, mode="economic", check_finite=False)
+        for _ in range(_REFINED):
+            r = self.P @ (w + dw) + self.q - self.G.T @ z
+            z += self.back(w, Q @ linalg.solve_triangular(T, r, trans=1, check_finite=False))
         return z
 
 
@@ -108,12 +127,12 @@ def _answer(problem: Problem, tolerance: float, factor: float) -> Answer:
     G = np.concatenate([program.G @ N, N, -N])
     g = np.concatenate([problem.g + program.G @ x0, size + x0, size - x0])
     parts = barriers([*cones, ("nonneg", slice(count, count + 2 * size.size))])
-    start, z = _start(parts, G, g, factor)
+    start, give, z = _start(parts, G, g, factor)
     if start is None:
         z = z[:count]
         z[equal] = linalg.lstsq(A.T, -program.G.T @ z)[0] if equal.size else z[equal]
         return Answer("infeasible", x0, z, "no point inside the cones")
-    stage = _Stage(parts, G, g, N.T * problem.P @ N, N.T @ (problem.q + problem.P * x0))
+    stage = _Stage(parts, G, g + give, N.T * problem.P @ N, N.T @ (problem.q + problem.P * x0))
     w, z = _followed(stage, start, _GAP * tolerance, factor)
     x = x0 + N @ w
     z = z[:count]
@@ -133,8 +152,11 @@ def _solved(A: Array, a: Array) -> tuple[Array, Array, Array]:
     return x0, Vt[rank:].T, A @ x0 + a
 
 
-def _start(parts: list[Barrier], G: Array, g: Array, factor: float) -> tuple[Array | None, Array]:
-    """Return w inside the cones, or None and a ray of the dual cone that proves that there is none."""
+def _start(parts: list[Barrier], G: Array, g: Array, factor: float) -> tuple[Array | None, Array, Array]:
+    """Return w inside the cones, by how much g had to give way, and a ray of the dual cone; w or the ray count.
+
+    Cones without an interior get one of the width `_GIVE`, far below the tolerance of an answer.
+    """
     e = np.zeros(g.size)
     for part in parts:
         e[part.rows] = part.unit
@@ -150,12 +172,14 @@ def _start(parts: list[Barrier], G: Array, g: Array, factor: float) -> tuple[Arr
     for _ in range(_STAGES):
         w, dw = _centred(stage, w, tau, until=n)
         if w[n] > 0.0:
-            return w[:n], g
+            return w[:n], 0.0 * e, e
         gap = stage.degree / tau
-        if (w[n] + gap < 0.0 and gap < 1e-3 * abs(w[n])) or gap < 1e-16:
+        if w[n] > -_GIVE and gap < _GIVE:
+            return w[:n], 2.0 * _GIVE * e, e
+        if gap < _SURE * abs(w[n]):
             break
         tau *= factor
-    return None, stage.dual(w, dw, tau, g.size + 1)[:-1]
+    return None, 0.0 * e, stage.dual(w, dw, tau)[:-1]
 
 
 def _followed(stage: _Stage, w: Array, gap: float, factor: float) -> tuple[Array, Array]:
@@ -166,7 +190,7 @@ def _followed(stage: _Stage, w: Array, gap: float, factor: float) -> tuple[Array
         if stage.degree / tau <= gap:
             break
         tau *= factor
-    z = stage.dual(w, dw, tau, stage.g.size)
+    z = stage.dual(w, dw, tau)
     return (w + dw if stage.inside(w + dw) else w), z
 
 
