@@ -23,6 +23,7 @@ from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.balancing.solvers.cones import outside
 
 _ZERO = 1e-9  # coefficient of a condition that counts as none [scaled, rows of unit size]
+_ROUND_OFF = 1e-13  # what is left of a condition that says nothing any more [of its largest coefficient]
 
 
 def empty(blocks: Sequence[Block], materials: Sequence[Material], n: int) -> tuple[bool, ...]:
@@ -48,7 +49,7 @@ def without(blocks: Sequence[Block], materials: Sequence[Material], gone: Sequen
         G = block.G.copy()
         G[:, columns] = 0.0
         if block.cone in ("zero", "nonneg"):
-            out += _kept_rows(replace(block, G=G))
+            out += _kept_rows(block, G)
         elif np.abs(G).max(initial=0.0) > 0.0 or outside(block.cone, block.g) > 0.0:
             out.append(replace(block, G=G))
     return out
@@ -85,17 +86,15 @@ def _vanishing(rows: Array, constants: Array, free: int) -> tuple[bool, ...]:
     return tuple(bool(w > 0.5) for w in held)
 
 
-def _kept_rows(block: Block) -> list[Block]:
-    """Return a block of single rows without those that say nothing any more."""
-    said = np.logical_or(np.abs(block.G).max(axis=1, initial=0.0) > 0.0, np.logical_not(_holds(block)))
+def _kept_rows(block: Block, G: Array) -> list[Block]:
+    """Return a block of single rows with other coefficients, without the rows that say nothing any more."""
+    nothing = _ROUND_OFF * np.abs(block.G).max(axis=1, initial=0.0)
+    holds = np.abs(block.g) <= nothing if block.cone == "zero" else block.g >= -nothing
+    said = np.logical_or(np.abs(G).max(axis=1, initial=0.0) > nothing, np.logical_not(holds))
     if not said.any():
         return []
     label = block.label
     if not isinstance(label, str):
         label = tuple(name for name, kept in zip(label, said, strict=True) if kept)
     inward = None if block.inward is None else block.inward[said]
-    return [Block(label, block.cone, block.G[said], block.g[said], inward, block.soft)]
-
-
-def _holds(block: Block) -> Array:
-    return np.asarray(block.g == 0.0 if block.cone == "zero" else block.g >= 0.0)
+    return [replace(block, label=label, G=G[said], g=block.g[said], inward=inward)]

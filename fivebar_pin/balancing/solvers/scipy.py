@@ -19,7 +19,7 @@ import numpy as np
 from scipy import linalg
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing.solvers.answer import Answer
+from fivebar_pin.balancing.solvers.answer import Answer, nothing
 from fivebar_pin.balancing.solvers.barrier import Barrier, barriers
 from fivebar_pin.balancing.solvers.program import Problem
 
@@ -34,7 +34,7 @@ _OPEN = 1e-9  # residual of equalities that contradict each other, relative
 _CENTRED = 1e-3  # squared Newton decrement at which a stage ends
 _NEWTON = 60  # steps of one stage
 _STAGES = 120
-_GIVE = 1e-9  # width given to cones without an interior, scaled as the program
+_GIVE = 1e-10  # width given to cones without an interior, scaled as the program
 _SURE = 1e-3  # gap of the search for a start at which its end is negative beyond doubt, relative
 _REFINED = 2  # corrections of z
 
@@ -108,8 +108,7 @@ def answers(problem: Problem, tolerance: float) -> Iterator[Answer]:
         try:
             yield _answer(problem, tolerance, factor)
         except linalg.LinAlgError:
-            nothing = np.full(problem.q.size, np.nan)
-            yield Answer("solved", nothing, np.full(problem.g.size, np.nan), "a factorisation failed")
+            yield nothing(problem, "a factorisation failed")
 
 
 def _answer(problem: Problem, tolerance: float, factor: float) -> Answer:
