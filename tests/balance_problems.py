@@ -75,7 +75,7 @@ def mechanism(rng: np.random.Generator) -> tuple[str, fb.ClosedChain, fb.Traject
 
 
 def _four_bar(rng: np.random.Generator) -> tuple[fb.ClosedChain, fb.Trajectory]:
-    lengths = np.array([0.4, 1.1, 0.9, 1.0]) + rng.uniform(-0.15, 0.15, 4)
+    lengths = np.array([0.4, 1.1, 0.9, 1.0]) + rng.uniform(-0.08, 0.08, 4)  # the crank turns fully
     chain = mechanisms.four_bar(lengths)
     t = np.linspace(0.0, 1.0, SAMPLES)
     q0 = fb.assembly_modes(chain, [0.5])[0]
@@ -124,8 +124,8 @@ def _region(rng: np.random.Generator, chain: fb.ClosedChain) -> Ball | Box | Ell
     return Box(2.0 * size, center) if choice == 2 else Ellipsoid(size, center)
 
 
-def decided(case: Case, conditions: BalanceConditions | None, *, solver: str = "CLARABEL") -> tuple[str, float]:
-    """Return "optimal" and the optimum, or "infeasible" and infinity, or what else cvxpy says."""
+def decided(case: Case, conditions: BalanceConditions | None, *, solver: str = "CLARABEL") -> tuple[str, float, float]:
+    """Return "optimal" and the optimum, or "infeasible" and infinity, or what else cvxpy says; and the typical size."""
     import cvxpy as cp
 
     written = Written(case, conditions)
@@ -133,8 +133,8 @@ def decided(case: Case, conditions: BalanceConditions | None, *, solver: str = "
     try:
         problem.solve(solver=solver)
     except cp.error.SolverError:
-        return "unsolved", float("nan")
-    return problem.status, float("inf") if problem.value is None else float(problem.value)
+        return "unsolved", float("nan"), written.size()
+    return problem.status, float("inf") if problem.value is None else float(problem.value), written.size()
 
 
 class Written:
@@ -308,6 +308,17 @@ class Written:
         if "limits" in self.case.arguments:
             top = self.case.arguments["limits"]["peak_torque"]
             self.constraints.append(self.cp.abs(self.values["torque"][0]) / top <= 1)
+
+    def size(self) -> float:
+        """Typical size of the objective: its terms at the present mechanism, or what moves them."""
+        out = 0.0
+        for name, weight in self.case.minimise.items():
+            typical = {"added_mass": self.M, "distance": 1.0}.get(name)
+            if typical is None:
+                loads = inverse_dynamics(self.chain, self.case.arguments["motions"][0])
+                typical = float(np.abs(getattr(loads, name.split("_", 1)[1])).max())
+            out += weight * typical
+        return out
 
     def term(self, name: str) -> Any:
         cp = self.cp
