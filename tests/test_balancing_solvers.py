@@ -302,3 +302,36 @@ def test_designs_that_exist_only_as_points_and_sheets_are_found(region: Ball | B
     assert design.feasible
     assert abs(design.gap) < 1e-7
     physical(design)
+
+
+def test_bodies_left_empty_leave_the_program_without_a_trace() -> None:
+    """No condition of round-off is left over, and moving a design onto the conditions gives them no material."""
+    problem = balance_problem(delta(), "force")
+    assert [m.label for m, gone in zip(problem.materials, problem.gone, strict=True) if gone] == [
+        "material added to slide_x",
+        "material added to slide_y",
+    ]
+    assert np.abs(problem.program.G).max(axis=1).min() > 1e-3
+    y, _ = problem._exact(np.random.default_rng(0).uniform(0.1, 1.0, problem.n), 0.0)
+    for m, gone in zip(problem.materials, problem.gone, strict=True):
+        assert y[m.start : m.start + m.size].any() != gone
+
+
+def test_masses_that_cancel_in_pairs_are_left_empty() -> None:
+    """m(a) + m(b) = 0 and m(c) - m(d) = 0 empty the first two bodies alone; a bound above zero empties none."""
+    from fivebar_pin.balancing._empty import empty, without
+    from fivebar_pin.balancing._material import Material
+
+    materials = [Material(b, 1, 4 * b, True, None, f"{b}") for b in range(4)]
+    rows = np.zeros((2, 16))
+    rows[0, [0, 4]], rows[1, [8, 12]] = 1.0, (1.0, -1.0)
+    own = [b for m in materials for b in m.blocks(16)]
+    equal = Block("equal", "zero", rows, np.zeros(2))
+    assert empty([equal, *own], materials, 16) == (True, True, False, False)
+    below = Block("below", "nonneg", -rows[:1], np.zeros(1))
+    assert empty([below, *own], materials, 16) == (True, True, False, False)
+    room = Block("below", "nonneg", -rows[:1], np.ones(1))
+    assert not any(empty([room, *own], materials, 16))
+    kept = without([equal, *own], materials, (True, True, False, False), 16)
+    assert sum(b.cone == "soc" for b in kept) == 2
+    assert [b.g.size for b in kept if b.cone == "zero"] == [8, 1]
