@@ -18,9 +18,11 @@ from fivebar_pin.balancing._parameters import pseudo_inertia
 from fivebar_pin.balancing.solvers import SOLVERS, Block, Program, solve, solver_named
 from fivebar_pin.balancing.solvers import answer as answers
 from fivebar_pin.balancing.solvers import clarabel as clarabel_file
+from fivebar_pin.balancing.solvers import scipy as scipy_file
 from fivebar_pin.balancing.solvers.bound import lower_bound, reach
 from fivebar_pin.balancing.solvers.certificate import certificate_of
 from fivebar_pin.balancing.solvers.cones import outside, projected, smat, vector
+from fivebar_pin.balancing.solvers.program import Problem
 from fivebar_pin.cli import main
 from fivebar_pin.errors import SolverError, UnknownNameError
 
@@ -335,3 +337,16 @@ def test_masses_that_cancel_in_pairs_are_left_empty() -> None:
     kept = without([equal, *own], materials, (True, True, False, False), 16)
     assert sum(b.cone == "soc" for b in kept) == 2
     assert [b.g.size for b in kept if b.cone == "zero"] == [8, 1]
+
+
+def test_where_the_default_has_no_acceptable_answer_the_second_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    chain, _ = balance_problems.moved("five_bar_case_I")
+
+    def nothing(problem: Problem, tolerance: float) -> Iterator[answers.Answer]:
+        yield answers.nothing(problem, "gave up")
+
+    monkeypatch.setattr(clarabel_file, "answers", nothing)
+    assert balance(chain, "force", region=Ball(0.1)).objective == pytest.approx(0.27, abs=1e-6)
+    monkeypatch.setattr(scipy_file, "answers", nothing)
+    with pytest.raises(SolverError, match="gave up"):
+        balance(chain, "force", region=Ball(0.1))

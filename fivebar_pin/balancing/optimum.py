@@ -66,7 +66,8 @@ def balance(
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
         gravity, about, near, space, seed: as for `balance_conditions`.
-        solver: "clarabel", or "scipy", which shares nothing with it and takes some fifty times as long.
+        solver: "clarabel", or "scipy", which shares nothing with it and takes some fifty times as long. Where Clarabel
+            has no acceptable answer, SciPy is asked before giving up.
 
     Returns:
         The design; ask its `feasible`, `chain`, `certificate`. Special lengths (antiparallelograms, kites) may leave no

@@ -31,7 +31,7 @@ from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, po
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.regions import Disc, Region
-from fivebar_pin.balancing.solvers import DEFAULT, Block, Certificate, Outcome, Program, solve, solver_named
+from fivebar_pin.balancing.solvers import DEFAULT, SECOND, Block, Certificate, Outcome, Program, solve, solver_named
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError, UnknownNameError
 
@@ -56,7 +56,13 @@ class _Asked:
     solver: str
 
     def solve(self, *, margin: float = 0.0, give: float = 0.0) -> Outcome:
-        return solve(self.program, self.P, self.q, margin=margin, give=give, solver=self.solver)
+        """Solve; where the default solver has no acceptable answer, the other one is asked before giving up."""
+        try:
+            return solve(self.program, self.P, self.q, margin=margin, give=give, solver=self.solver)
+        except SolverError as error:
+            if self.solver != DEFAULT or np.isnan(error.residual):
+                raise
+        return solve(self.program, self.P, self.q, margin=margin, give=give, solver=SECOND)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -19,8 +19,9 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.program import Program
 
-__all__ = ["lower_bound", "reach"]
+__all__ = ["lower_bound", "reach", "stationary"]
 
+_RANK = 1e-10  # singular value of the weighted rows that counts as none, relative
 _EPSILON = float(np.finfo(np.float64).eps)
 
 
@@ -32,6 +33,16 @@ def lower_bound(program: Program, P: Array, q: Array, x: Array, z: Array) -> flo
     lost = _products(np.abs(r) + _round_off(program, z), program.sizes)
     lost += z.size * _EPSILON * (float(np.abs(program.g) @ np.abs(z)) + quadratic)
     return -float(program.g @ z) - quadratic - lost
+
+
+def stationary(program: Program, z: Array, target: Array) -> Array:
+    """Return z moved onto G^T z = target (n,) by the smallest step; rows that z uses are moved most."""
+    weight = np.ones_like(z)
+    for block, part in zip(program.blocks, program.slices, strict=True):
+        if block.cone != "zero":
+            weight[part] = np.minimum(1.0, np.linalg.norm(z[part]))
+    across = np.linalg.pinv((weight[:, None] * program.G).T, rcond=_RANK)
+    return np.asarray(z + weight * (across @ (target - program.G.T @ z)))
 
 
 def reach(program: Program, z: Array, g: Array) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing.solvers.bound import reach
+from fivebar_pin.balancing.solvers.bound import reach, stationary
 from fivebar_pin.balancing.solvers.cones import outside
 from fivebar_pin.balancing.solvers.program import Program
 from fivebar_pin.errors import SolverError
@@ -92,19 +92,8 @@ def _violation(program: Program, z: Array) -> float:
 
 def polished(program: Program, z: Array, g: Array) -> Array:
     """Return a dual ray moved onto G^T z = 0, with g.z = -1."""
-    z = z / -float(g @ z)
-    z = z - _reach(program, z) @ (program.G.T @ z)
+    z = stationary(program, z / -float(g @ z), np.zeros(program.n))
     return np.asarray(z / -float(g @ z))
-
-
-def _reach(program: Program, z: Array) -> Array:
-    """Return the weighted pseudo-inverse (rows, n) of G^T; rows that z uses are moved most."""
-    weight = np.ones_like(z)
-    for block, part in zip(program.blocks, program.slices, strict=True):
-        if block.cone != "zero":
-            weight[part] = np.minimum(1.0, np.linalg.norm(z[part]))
-    W = weight[:, None] * program.G
-    return np.asarray(weight[:, None] * np.linalg.pinv(W.T, rcond=1e-10))
 
 
 def _conflict(program: Program, z: Array, g: Array) -> dict[str, float]:

@@ -12,15 +12,16 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.answer import Answer, Solver
-from fivebar_pin.balancing.solvers.bound import lower_bound
+from fivebar_pin.balancing.solvers.bound import lower_bound, stationary
 from fivebar_pin.balancing.solvers.certificate import Certificate, certificate_of
 from fivebar_pin.balancing.solvers.program import Problem, Program
 from fivebar_pin.errors import SolverError, UnknownNameError
 
-__all__ = ["DEFAULT", "SOLVERS", "Outcome", "solve", "solver_named"]
+__all__ = ["DEFAULT", "SECOND", "SOLVERS", "Outcome", "solve", "solver_named"]
 
 SOLVERS = ("clarabel", "scipy")  # each is the module of this name beside this one, with its function `answers`
 DEFAULT = "clarabel"
+SECOND = "scipy"  # asked where the default has no acceptable answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +97,7 @@ def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
     P, q, g, G = problem.P, problem.q, problem.g, problem.program.G
     x, z = answer.x, answer.z
     if not (np.isfinite(x).all() and np.isfinite(z).all()):
-        raise SolverError(f"the conic solver stopped without an answer ({answer.status})")
+        raise SolverError(f"the conic solver stopped without an answer ({answer.status})", residual=np.inf)
     quadratic = float(x @ (P * x))
     objective, dual = 0.5 * quadratic + float(q @ x), -float(g @ z) - 0.5 * quadratic
     scale = 1.0 + float(np.abs(x).max(initial=0.0))
@@ -112,4 +113,7 @@ def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
             residual=worst,
             tolerance=tolerance,
         )
-    return Outcome(x, z, objective, dual, lower_bound(problem.program, P, q, x, z), None)
+    bound = lower_bound(problem.program, P, q, x, z)
+    if objective - bound > tolerance * (1.0 + abs(objective)):  # what stationarity leaves over is worth a correction
+        bound = max(bound, lower_bound(problem.program, P, q, x, stationary(problem.program, z, P * x + q)))
+    return Outcome(x, z, objective, dual, bound, None)
