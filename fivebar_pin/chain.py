@@ -141,12 +141,16 @@ class ClosedChain:
 
     @cached_property
     def length(self) -> float:
-        """Characteristic length [m]: the mean distance between neighbouring joints, closures included."""
+        """Characteristic length [m]: the mean distance between neighbouring joints, closures included.
+
+        What stands on the ground counts from the first joint there, so that it does not matter where the mechanism is.
+        """
         model = self.model
-        spans = [float(np.linalg.norm(model.jointPlacements[j].translation)) for j in range(1, model.njoints)]
-        for closure in self.closures:
-            for f in closure.frames:
-                spans.append(float(np.linalg.norm(find_frame(model, f).placement.translation)))
+        spans, origin = [], np.array(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
+        places = [(model.parents[j], model.jointPlacements[j].translation) for j in range(1, model.njoints)]
+        ends = [find_frame(model, f) for closure in self.closures for f in closure.frames]
+        for parent, place in [*places, *((f.parentJoint, f.placement.translation) for f in ends)]:
+            spans.append(float(np.linalg.norm(place - origin if parent == 0 else place)))
         real = [s for s in spans if s > 0.0]
         return float(np.mean(real)) if real else 1.0
 

@@ -49,7 +49,7 @@ def planar(chain: fb.ClosedChain) -> np.ndarray:
 def test_case_I_least_added_mass_is_270_grams() -> None:
     """Each link needs its balance at 0.1 m: 0.042 + 0.078 + 0.15 kg."""
     chain, _ = case_I()
-    design = balance(chain, "force", region=Ball(REACH))
+    design = balance(chain, "force", material=None, region=Ball(REACH))
     assert design.feasible
     assert design.objective == pytest.approx(0.27, abs=1e-6)
     assert design.added_mass == pytest.approx(0.27, abs=1e-6)
@@ -108,7 +108,7 @@ def test_least_added_mass_agrees_with_a_linear_program_over_point_masses() -> No
         column[0], column[1], column[2], column[9] = 1.0, x[keep], y[keep], x[keep] ** 2 + y[keep] ** 2
         A = np.hstack([conditions.matrix[:, 10 * b : 10 * b + 10] @ column for b in range(4)])
         found = linprog(np.ones(A.shape[1]), A_eq=A, b_eq=-conditions.residual())
-        design = balance(chain, "force", region=region)
+        design = balance(chain, "force", material=None, region=region)
         assert design.objective == pytest.approx(found.fun, rel=1e-6)
 
 
@@ -149,7 +149,9 @@ def test_optimum_agrees_with_the_same_problem_written_in_cvxpy() -> None:
     torque = base.ravel() + np.array(columns).T @ delta
     rms = cp.norm(torque) / np.sqrt(len(path))
     wanted = cp.Problem(cp.Minimize(1e2 * rms), constraints).solve(solver="CLARABEL") / 1e2
-    design = balance(chain, "force", region=Ball(REACH), masses=(0.0, 1.0), motions=path, minimise="rms_torque")
+    design = balance(
+        chain, "force", material=None, region=Ball(REACH), masses=(0.0, 1.0), motions=path, minimise="rms_torque"
+    )
     assert design.objective == pytest.approx(wanted, rel=1e-6)
     torque = inverse_dynamics(design.chain, path).torque
     assert np.sqrt((torque**2).sum(axis=1).mean()) == pytest.approx(design.objective, rel=1e-9)
@@ -240,15 +242,15 @@ def test_farkas_certificate_holds_when_recomputed_here() -> None:
 
 def test_limits_are_kept_or_proved_contradictory() -> None:
     chain, path = case_I()
-    free = balance(chain, "force", region=Ball(REACH), motions=path)
+    free = balance(chain, "force", material=None, region=Ball(REACH), motions=path)
     limits = {"peak_torque": 0.8 * free.after["peak_torque"]}
-    bounded = balance(chain, "force", region=Ball(REACH), motions=path, limits=limits)
+    bounded = balance(chain, "force", material=None, region=Ball(REACH), motions=path, limits=limits)
     assert bounded.feasible
     assert np.abs(inverse_dynamics(bounded.chain, path).torque).max() <= limits["peak_torque"]
     assert bounded.objective > free.objective + 1e-4
-    each = balance(chain, "force", region=Ball(REACH), motions=path, limits={"peak_torque": [0.05, 0.2]})
+    each = balance(chain, "force", material=None, region=Ball(REACH), motions=path, limits={"peak_torque": [0.05, 0.2]})
     assert (np.abs(inverse_dynamics(each.chain, path).torque).max(axis=0) <= [0.05, 0.2]).all()
-    never = balance(chain, "force", region=Ball(REACH), motions=path, limits={"peak_torque": 0.01})
+    never = balance(chain, "force", material=None, region=Ball(REACH), motions=path, limits={"peak_torque": 0.01})
     check_certificate(never)
     assert any("peak_torque" in c for c in never.certificate.conflict)
 
@@ -279,6 +281,7 @@ def test_redesign_keeps_mass_bounds_and_exact_masses() -> None:
         "force",
         mode="redesign",
         region=Ball(REACH),
+        material=None,
         masses={j: (m, m) for j, m in zip(chain.joints, masses, strict=True)},
     )
     np.testing.assert_allclose(design.parameters[:, 0], masses, rtol=1e-12)
@@ -287,7 +290,7 @@ def test_redesign_keeps_mass_bounds_and_exact_masses() -> None:
 
 def test_chosen_bodies_only_change() -> None:
     chain, _ = case_I()
-    design = balance(chain, "force", region=Ball(REACH), bodies=["psi", "theta_psi", "gamma"])
+    design = balance(chain, "force", material=None, region=Ball(REACH), bodies=["psi", "theta_psi", "gamma"])
     np.testing.assert_array_equal(design.parameters[1], chain.inertial_parameters[1])
     assert design.objective == pytest.approx(0.27, abs=1e-6)
 
@@ -304,8 +307,10 @@ def test_optimum_scales_with_the_unit_of_length(size: float) -> None:
     lengths = np.array([0.4, 1.1, 0.9, 1.0])
     bodies = {j: mechanisms.body(k + 1) for k, j in enumerate(("crank", "coupler", "rocker"))}
     large = {j: pin.Inertia(I.mass, np.array(I.lever) * size, np.array(I.inertia) * size**2) for j, I in bodies.items()}
-    one = balance(mechanisms.four_bar(lengths), "force", region=Ball(0.5))
-    other = balance(mechanisms.four_bar(lengths * size).with_inertias(large), "force", region=Ball(0.5 * size))
+    one = balance(mechanisms.four_bar(lengths), "force", material=None, region=Ball(0.5))
+    other = balance(
+        mechanisms.four_bar(lengths * size).with_inertias(large), "force", material=None, region=Ball(0.5 * size)
+    )
     assert other.objective == pytest.approx(one.objective, rel=1e-6)
 
 
@@ -390,7 +395,7 @@ def test_objectives_without_weight_do_not_slow_or_change_a_solve() -> None:
     """A problem prepared for many objectives answers as one prepared for a single one."""
     chain, path = case_I()
     many = ("added_mass", "peak_torque", "rms_shaking_moment", "distance")
-    problem = balance_problem(chain, "force", region=Ball(REACH), motions=path, objectives=many)
+    problem = balance_problem(chain, "force", material=None, region=Ball(REACH), motions=path, objectives=many)
     design = problem.solve({"added_mass": 1.0, "peak_torque": 0.0})
     assert design.objective == pytest.approx(0.27, abs=1e-6)
     assert design.terms["peak_torque"] == pytest.approx(np.abs(inverse_dynamics(design.chain, path).torque).max())

@@ -190,7 +190,7 @@ def test_conditions_prints_the_rank(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_balance_writes_a_balanced_mechanism(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """0.27 kg balance case I; what is written balances after it has been read back."""
-    words = ["balance", "five_bar_case_I", "--radius", "0.1", "--out", str(tmp_path / "o")]
+    words = ["balance", "five_bar_case_I", "--radius", "0.1", "--material", "none", "--out", str(tmp_path / "o")]
     assert main(words) == 0
     assert "+0.27 kg" in capsys.readouterr().out
     chain = fb.load(tmp_path / "o" / "five_bar_case_I_balanced.urdf").with_gravity((0.0, 0.0, 0.0))

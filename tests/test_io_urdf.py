@@ -81,8 +81,8 @@ def assert_same(first: ClosedChain, second: ClosedChain, rtol: float = 1e-15) ->
     for x, y in zip(a.inertias, b.inertias, strict=True):
         scale = max(1.0, float(np.abs(x.toDynamicParameters()).max()))
         np.testing.assert_allclose(y.toDynamicParameters(), x.toDynamicParameters(), rtol=0.0, atol=rtol * scale)
-        np.testing.assert_allclose(y.lever, x.lever, rtol=rtol)
-        assert y.mass == x.mass
+        np.testing.assert_allclose(y.lever, x.lever, rtol=rtol, atol=rtol)
+        assert y.mass == pytest.approx(x.mass, rel=rtol)
     for word in (*VECTORS, *LOSSES):
         np.testing.assert_array_equal(getattr(b, word), getattr(a, word), err_msg=word)
     np.testing.assert_array_equal(b.gravity.linear, a.gravity.linear)

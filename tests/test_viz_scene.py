@@ -195,7 +195,7 @@ def test_counterweights_are_named_by_their_bodies_in_one_entry(
 
     bare = replace(linkage.chain(), visuals=())
     for chain in (linkage.chain(), bare):
-        design = fb.balance(chain, "force", region=balancing.Ball(0.1))
+        design = fb.balance(chain, "force", bodies=("psi", "theta_psi", "gamma"), region=balancing.Ball(0.1))
         heavier = balancing.realise(design).chain
         if stored:
             fb.save(heavier, tmp_path / f"{len(chain.visuals)}.urdf")

@@ -71,12 +71,13 @@ References:
 from __future__ import annotations
 
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
-from fivebar_pin.balancing.counterweights import MATERIALS, Counterweight, Realisation, realise
+from fivebar_pin.balancing.counterweights import Counterweight, Realisation, realise
 from fivebar_pin.balancing.design import Certificate, Change, Design
 from fivebar_pin.balancing.front import Comparison, ParetoFront, alici_shirinzadeh, compare, pareto
 from fivebar_pin.balancing.optimum import balance
+from fivebar_pin.balancing.pieces import MATERIALS, Bar, Disc, Sphere
 from fivebar_pin.balancing.problem import BalanceProblem, balance_problem
-from fivebar_pin.balancing.regions import Ball, Box, Disc, Ellipsoid
+from fivebar_pin.balancing.regions import Ball, Box, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
 from fivebar_pin.balancing.scoring import Scores, score
 from fivebar_pin.balancing.variations import variations
@@ -87,6 +88,7 @@ __all__ = [
     "BalanceConditions",
     "BalanceProblem",
     "Ball",
+    "Bar",
     "Box",
     "Certificate",
     "Change",
@@ -99,6 +101,7 @@ __all__ = [
     "Realisation",
     "Regressor",
     "Scores",
+    "Sphere",
     "alici_shirinzadeh",
     "balance",
     "balance_conditions",

@@ -31,51 +31,40 @@ def lift(problem: BalanceProblem, y: Array) -> Lifted:
 
     Planar material is made flat, at the height of the present body's centre of mass.
     """
-    chain, space = problem.chain, problem.space
-    present = np.array(chain.inertial_parameters)
-    pi = np.array(present)
-    pieces: dict[int, dict[int, Array]] = {1: {}, -1: {}}
+    joints = problem.chain.joints
+    present = np.array(problem.chain.inertial_parameters)
+    pi = present + problem.arms
     lowest = np.inf
+    pieces: dict[int, list[Change]] = {1: [], -1: []}
     for m in problem.materials:
-        own = y[m.start : m.start + m.size] * problem.mass
-        unit = np.append(space.length**space.orders, np.full(m.size - m.width, space.length**2))
-        z = own * unit
-        pieces[m.sign][m.body] = _ten(problem, m, z)
-        lowest = min(lowest, lowest_eigenvalue(z[: m.width], planar=m.planar))
-    for b, added in pieces[1].items():
-        pi[b] = added if problem.mode == "redesign" else present[b] + added
-    for b, removed in pieces[-1].items():
-        pi[b] = pi[b] - removed
-        lowest = min(lowest, lowest_eigenvalue(space.of(pi)[b], planar=space.planar))
-    return Lifted(
-        pi,
-        tuple(change_of(chain.joints[b], x) for b, x in pieces[1].items()),
-        tuple(change_of(chain.joints[b], x) for b, x in pieces[-1].items()),
-        float(lowest),
-    )
+        ten = _ten(problem, m, y[m.start : m.start + m.size])
+        lowest = min(lowest, lowest_eigenvalue(ten, planar=False))
+        pieces[m.sign].append(change_of(joints[m.body], ten))
+        if m.sign < 0:
+            lowest = min(lowest, lowest_eigenvalue(present[m.body] - ten, planar=False))
+        pi[m.body] = ten if problem.mode == "redesign" else pi[m.body] + m.sign * ten
+    return Lifted(pi, tuple(pieces[1]), tuple(pieces[-1]), float(lowest))
 
 
 def lowest_eigenvalue(x: Array, *, planar: bool) -> float:
-    """Return the smallest eigenvalue of the pseudo-inertia of one body (width,)."""
+    """Return the smallest eigenvalue of the pseudo-inertia of one body (4,) or (10,)."""
     if planar:
         h = float(np.hypot(x[1], x[2]))
         return float(np.linalg.eigvalsh(np.array([[x[3], h], [h, x[0]]]))[0])
     return float(np.linalg.eigvalsh(pseudo_inertia(x))[0])
 
 
+def height_of(chain_parameters: Array, normal: Array) -> float:
+    """Return the height of a body's mass centre (10,) along a normal in joint axes [m]; 0 without mass."""
+    mass = float(chain_parameters[0])
+    return float(normal @ chain_parameters[1:4]) / mass if mass > 0.0 else 0.0
+
+
 def _ten(problem: BalanceProblem, m: Material, z: Array) -> Array:
-    if not m.planar:
-        return z
-    axes = problem.space.axes[m.body]
-    present = problem.chain.inertial_parameters[m.body]
-    height = float(axes[2] @ present[1:4]) / float(present[0]) if present[0] > 0.0 else 0.0
-    P = np.zeros((4, 4))
-    P[:2, :2] = m.second_moments(z)
-    P[:2, 2] = P[2, :2] = height * z[1:3]
-    P[2, 2] = height**2 * z[0]
-    P[:2, 3] = P[3, :2] = z[1:3]
-    P[2, 3] = P[3, 2] = height * z[0]
-    P[3, 3] = z[0]
-    turn = np.eye(4)
-    turn[:3, :3] = axes.T
+    """Return the ten parameters of a piece, SI units."""
+    space, turn = problem.space, np.eye(4)
+    axes = np.array(space.axes[m.body])
+    turn[:3, :3] = space.length * axes.T
+    height = height_of(problem.chain.inertial_parameters[m.body], axes[2]) / space.length
+    P = problem.mass * m.pseudo_inertia(z, height)
     return np.asarray(from_pseudo_inertia(turn @ P @ turn.T))

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin.balancing import _lift
-from fivebar_pin.balancing._material import Material
-from fivebar_pin.balancing._parameters import Space
+from fivebar_pin.balancing._making import Sizes
+from fivebar_pin.balancing._material import Bounds, Material, material
+from fivebar_pin.balancing._parameters import Space, pseudo_inertia
 from fivebar_pin.balancing.conditions import BalanceConditions
-from fivebar_pin.balancing.regions import Ball, Disc, Region, resolve
+from fivebar_pin.balancing.pieces import Piece, Sphere, density_bound
+from fivebar_pin.balancing.regions import Ball, Region, resolve
 from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 MassBounds = tuple[float, float] | Mapping[str, tuple[float, float]] | None
+_WHOLE = 1e-9  # negative eigenvalue of a pseudo-inertia that is round-off [of its mass, at the chain's length]
 CAP = 10.0  # largest mass added to one body unless given [moving masses]
 
 
@@ -29,6 +32,7 @@ class Setup:
     space: Space
     conditions: BalanceConditions | None
     mode: str
+    arms: Array  # inertial parameters (nb, 10) of the arms that carry counterweights
 
     @property
     def mass(self) -> float:
@@ -41,9 +45,15 @@ class Setup:
         return np.asarray(self.space.scale * self.mass)
 
     def present(self) -> Array:
-        """Return the present scaled parameters (nb, width)."""
-        x = self.space.of(self.chain.inertial_parameters).reshape(-1) / self.unit
+        """Return the present scaled parameters (nb, width), arms included."""
+        x = self.space.of(self.chain.inertial_parameters + self.arms).reshape(-1) / self.unit
         return np.asarray(x.reshape(-1, self.space.width))
+
+    def body(self, b: int) -> Array:
+        """Return the scaled pseudo-inertia (4, 4) of a present body in the axes of the space, arms left out."""
+        turn = np.eye(4)
+        turn[:3, :3] = np.array(self.space.axes[b]) / self.space.length
+        return np.asarray(turn @ pseudo_inertia(self.chain.inertial_parameters[b]) @ turn.T / self.mass)
 
     def check_physical(self) -> None:
         """Raise when a present body could not exist."""
@@ -99,38 +109,89 @@ class Setup:
     def materials(
         self,
         chosen: Sequence[int],
-        region: Region | Mapping[str, Region] | None,
         removable: Sequence[int],
-        counterweight: Disc | Mapping[str, Disc] | None,
+        region: Region | Mapping[str, Region] | None,
+        counterweight: Piece | Mapping[str, Piece] | None,
+        density: tuple[float, float] | None,
+        sizes: Sizes,
     ) -> list[Material]:
-        """Return the pieces of material that are variables."""
-        for given, what in ((region, "region"), (counterweight, "counterweight")):
-            for name in given if isinstance(given, Mapping) else ():
-                if name not in self.chain.joints:
-                    raise UnknownNameError(f"body of a {what}", name, self.chain.joints)
-        if counterweight is not None and (self.mode != "add" or not self.space.planar):
-            raise InvalidInputError("counterweight", "Disc", "needs a planar mechanism and mode 'add'")
+        """Return the pieces of material that are variables.
+
+        Args:
+            chosen, removable: indices of the bodies that may change and that may lose material.
+            region, counterweight: where material may lie and what it is made as, for all bodies or by name.
+            density: of all material that is not a counterweight [kg/m3], and its thickness [m]; None for any.
+            sizes: by body, about which counterweights are bounded in size from above; others from below.
+        """
+        self._check_names(region, "region")
+        self._check_names(counterweight, "counterweight")
         out, start = [], 0
         word = "new body" if self.mode == "redesign" else "material added to"
         for bodies, sign, label in ((chosen, 1, word), (removable, -1, "material removed from")):
             for b in bodies:
-                name = self.chain.joints[b]
-                own = region.get(name) if isinstance(region, Mapping) else region
-                planar = self.space.planar
-                shape = resolve(
-                    own or Ball(self.chain.length),
-                    self.chain,
-                    b,
-                    self.space.axes[b],
-                    planar=planar,
-                    unit=self.space.length,
-                )
-                disc = counterweight.get(name) if isinstance(counterweight, Mapping) else counterweight
-                solid = disc.scaled(self.space.axes[b], self.mass, self.space.length) if disc and sign > 0 else None
-                material = Material(b, sign, start, planar, shape, f"{label} {name}", solid)
-                out.append(material)
-                start += material.size
+                own = self._bounds_of(b, sign, region, counterweight, density, sizes)
+                made = material(b, sign, start, f"{label} {self.chain.joints[b]}", own, planar=self.space.planar)
+                out.append(made)
+                start += made.size
         return out
+
+    def piece(self, b: int, counterweight: Piece | Mapping[str, Piece] | None) -> Piece | None:
+        """Return what the material added to a body is to be made as."""
+        name = self.chain.joints[b]
+        piece = counterweight.get(name) if isinstance(counterweight, Mapping) else counterweight
+        if piece is None:
+            return None
+        if not isinstance(piece, Piece):
+            raise InvalidInputError(f"counterweight of body {name}", piece, "must be a Disc, a Bar or a Sphere")
+        if self.mode != "add":
+            raise InvalidInputError("counterweight", type(piece).__name__, "needs mode 'add'")
+        if not isinstance(piece, Sphere) and not self.space.planar:
+            raise InvalidInputError(
+                "counterweight", type(piece).__name__, "needs a planar mechanism", "Use balls: Sphere."
+            )
+        return piece
+
+    def _check_names(self, given: object, what: str) -> None:
+        for name in given if isinstance(given, Mapping) else ():
+            if name not in self.chain.joints:
+                raise UnknownNameError(f"body of a {what}", name, self.chain.joints)
+
+    def _bounds_of(
+        self,
+        b: int,
+        sign: int,
+        region: Region | Mapping[str, Region] | None,
+        counterweight: Piece | Mapping[str, Piece] | None,
+        density: tuple[float, float] | None,
+        sizes: Sizes,
+    ) -> Bounds:
+        space, name = self.space, self.chain.joints[b]
+        own = region.get(name) if isinstance(region, Mapping) else region
+        where = own or Ball(self.chain.length)
+        shape = resolve(where, self.chain, b, space.axes[b], planar=space.planar, unit=space.length)
+        piece = self.piece(b, counterweight) if sign > 0 else None
+        size = sizes.get(b)
+        solid = None if piece is None else piece.solid(space.axes[b], self.mass, space.length)
+        if solid is not None and size is not None:
+            solid = replace(solid, radius=size.radius)
+        bound = None
+        if density is not None:
+            bound = density_bound(*density, planar=space.planar, mass=self.mass, length=space.length)
+        taken = self._taken(b) if sign < 0 else None
+        return Bounds(shape, bound, solid, None if size is None else size.center, taken)
+
+    def _taken(self, b: int) -> Array:
+        """Return the body that material is taken from, which must exist in space and not only in the plane."""
+        P = self.body(b)
+        lowest = float(np.linalg.eigvalsh(P)[0]) / max(float(P[3, 3]), 1e-300)
+        if lowest < -_WHOLE:
+            raise InvalidInputError(
+                f"remove: inertia of body {self.chain.joints[b]}",
+                [float(v) for v in self.chain.inertial_parameters[b]],
+                f"is not that of a body in space (pseudo-inertia has the eigenvalue {lowest:.3g}, scaled)",
+                "Give all six entries of its inertia: what is left must be a body.",
+            )
+        return P
 
     def map(self, materials: Sequence[Material]) -> tuple[Array, Array]:
         """Return E, X0 with scaled parameters = X0 + E y."""
@@ -157,15 +218,10 @@ class Setup:
             R = self.conditions.rows
             labels = tuple(f"[{text}]" for text in self.conditions.equations)
             blocks.append(Block(labels, "zero", R @ E, R @ X0))
-        w = self.space.width
         for m in materials:
             blocks += m.blocks(n)
-            if m.sign < 0:  # what is left of a body is a body
-                left = Material(m.body, 1, m.start, m.planar, None, "").blocks(n)[0]
-                own = left.G[:, m.parameters] @ X0[m.body * w : (m.body + 1) * w]
-                label = f"what is left of {self.chain.joints[m.body]} is a physical body"
-                blocks.append(Block(label, left.cone, -left.G, own, left.inward))
-                half = 0.5 * X0[m.body * w : m.body * w + 1]
+            if m.sign < 0:
+                half = 0.5 * self.body(m.body)[3:, 3]
                 blocks.append(Block(f"{m.label} <= half its mass", "nonneg", -unit_row(m.start, n), half))
         for m in materials:
             if m.sign > 0:

@@ -1,4 +1,4 @@
-"""Counterweights one can make: discs (with a bore where needed), bars and balls that carry given parameters.
+"""Counterweights one can make: discs (with a bore where needed), bars and balls, and the arms that carry them.
 
 In the plane a flat piece of density d and thickness t has the area A = m / (d t). With its polar inertia I about its
 mass centre,
@@ -6,8 +6,8 @@ mass centre,
     disc with radii r > b:   I = m (r^2 + b^2) / 2,    A = pi (r^2 - b^2)     possible when I >= m^2 / (2 pi d t)
     bar  with sides l > w:   I = m (l^2 + w^2) / 12,   A = l w                possible when I >= m^2 / (6 d t)
 
-so mass, place and inertia come out exact. Asked for less inertia than that, the solid disc or the square bar is the
-closest; mass and place are exact still, and the surplus of inertia is stated.
+so mass, place and inertia come out exact. A ball has the inertia that it has. What is stated of a realisation is
+measured on the bodies that it consists of, never taken from the optimum that they were made for.
 """
 
 from __future__ import annotations
@@ -20,22 +20,25 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, frozen
+from fivebar_pin.balancing._making import across, arm_width
 from fivebar_pin.balancing._parameters import Space
+from fivebar_pin.balancing._quantities import reflected_inertia
+from fivebar_pin.balancing._terms import base, measure_of
 from fivebar_pin.balancing.design import Change, Design
+from fivebar_pin.balancing.pieces import THICKNESS, Bar, Disc, Piece, Sphere, density_of, positive
+from fivebar_pin.balancing.problem import assembled
+from fivebar_pin.balancing.regions import Ball, resolve
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
-__all__ = ["MATERIALS", "Counterweight", "Realisation", "realise"]
+__all__ = ["Counterweight", "Realisation", "realise"]
 
-MATERIALS: Mapping[str, float] = {
-    "aluminium": 2700.0,
-    "brass": 8500.0,
-    "lead": 11340.0,
-    "steel": 7850.0,
-    "tungsten": 19250.0,
-}  # densities [kg/m3]
-SHAPES = ("disc", "bar", "ball")
+SHAPES: Mapping[str, type[Piece]] = {"disc": Disc, "bar": Bar, "ball": Sphere}
 COLOUR = (0.86, 0.36, 0.10, 1.0)  # of every counterweight: by it the viewer knows them, in files too
+_SAME = 1e-6  # difference of realised and promised terms that counts as none [of the term or its size before]
+_EXACT = 1e-9  # residual of the conditions that counts as balanced [of the moving mass]
+_BORED = 1e-6  # bore below this share of the area is not drilled [-]
+_RIM = 720  # points of a rim that are asked whether they lie in the region
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +54,10 @@ class Counterweight:
         parameters: its ten inertial parameters about the joint origin.
         deviation: largest difference to the wanted mass, first moment and inertia (3,) [kg, kg m, kg m2]; of a planar
             mechanism only the parameters that it feels count.
+        radius: from its centre to its farthest point, in the plane of a flat piece [m].
+        overhang: how far it sticks out of its region [m]; 0 when it lies within.
+        arm: the arm that carries it, or None.
+        arm_size: its length, width and thickness (3,) [m].
     """
 
     body: str
@@ -60,6 +67,22 @@ class Counterweight:
     pose: Array
     parameters: Array
     deviation: Array
+    radius: float
+    overhang: float
+    arm: Change | None
+    arm_size: tuple[float, ...]
+
+    def __str__(self) -> str:
+        size = " x ".join(f"{1e3 * s:.4g}" for s in self.size)
+        if self.shape == "disc":
+            r, bore, t = (1e3 * s for s in self.size)
+            size = f"radius {r:.4g}, " + (f"bore radius {bore:.4g}, " if bore else "") + f"thickness {t:.4g}"
+        place = ", ".join(f"{1e3 * x:.4g}" for x in np.round(self.pose[:3, 3], 9) + 0.0)
+        out = "" if self.overhang <= 0.0 else f", {1e3 * self.overhang:.3g} mm out of its region"
+        own = float(np.abs(self.parameters[4:]).max())
+        off = "" if self.deviation[2] <= _SAME * own else f", inertia off by {self.deviation[2]:.2g} kg m2"
+        arm = "" if self.arm is None else f", on an arm of {1e3 * self.arm_size[0]:.4g} mm, {self.arm.mass:.4g} kg"
+        return f"{self.body}: {self.shape} {size} mm, {self.parameters[0]:.5g} kg at ({place}) mm{arm}{off}{out}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,7 +90,7 @@ class Realisation:
     """Counterweights for a design, and the mechanism that carries them.
 
     Attributes:
-        design: what was wanted.
+        design: what they were made for; solved in pieces of their kind.
         weights: one for each body that gets material.
     """
 
@@ -78,62 +101,166 @@ class Realisation:
         return f"Realisation({len(self.weights)} counterweights on {self.design.original.name!r})"
 
     def __str__(self) -> str:
-        lines = [repr(self)]
-        for w in self.weights:
-            size = " x ".join(f"{1e3 * s:.4g}" for s in w.size)
-            lines.append(
-                f"  {w.body}: {w.shape} {size} mm, {w.parameters[0]:.5g} kg, inertia off by {w.deviation[2]:.2g} kg m2"
-            )
-        return "\n".join(lines)
+        lines = [repr(self), *(f"  {w}" for w in self.weights)]
+        rows = [(name, f"{x:.6g}", f"{self.terms[name]:.6g}") for name, x in self.promised.items()]
+        lines += [f"  {name}: {x} promised, {y} realised" for name, x, y in rows]
+        return "\n".join([*lines, f"  {self.claim}"])
 
     @property
     def deviation(self) -> Array:
         """Largest deviations over all pieces (3,) [kg, kg m, kg m2]."""
         return frozen(np.max([w.deviation for w in self.weights], axis=0) if self.weights else np.zeros(3))
 
-    @cached_property
-    def chain(self) -> ClosedChain:
-        """The mechanism with its counterweights, drawn in a colour of their own."""
+    @property
+    def parameters(self) -> Array:
+        """Inertial parameters (nb, 10) of the bodies with what was made, summed piece by piece."""
         original = self.design.original
         pi = np.array(original.inertial_parameters)
         for removed in self.design.removed:
             pi[original.joints.index(removed.body)] -= removed.parameters
         for w in self.weights:
-            pi[original.joints.index(w.body)] += w.parameters
-        chain = _with_frames(original, [w.body for w in self.weights]).with_inertial_parameters(pi)
-        return replace(chain, visuals=(*chain.visuals, *(_visual(chain, w) for w in self.weights)))
+            b = original.joints.index(w.body)
+            pi[b] += w.parameters + (0.0 if w.arm is None else w.arm.parameters)
+        return frozen(pi)
+
+    @cached_property
+    def promised(self) -> dict[str, float]:
+        """Terms of the objective, and rms and peaks along the motions, of the design."""
+        return {**self.design.terms, **self.design.after}
+
+    @cached_property
+    def terms(self) -> dict[str, float]:
+        """The same, measured on the bodies that were made."""
+        return {name: self._measured(name) for name in self.promised}
+
+    @cached_property
+    def residual(self) -> float:
+        """Largest residual of the conditions of what was made, over the moving mass [-]."""
+        conditions = self.design.conditions
+        if conditions is None or not conditions.rank:
+            return 0.0
+        return float(np.abs(conditions.residual(self.parameters)).max() / (self.chain.mass or 1.0))
+
+    @property
+    def attained(self) -> bool:
+        """Whether what was made is balanced, lies in its regions, and has the terms that the design promises."""
+        before = {**self.design.terms, **self.design.before}
+        same = all(
+            abs(self.terms[k] - x) <= _SAME * max(abs(x), abs(before.get(k, 0.0))) + 1e-12
+            for k, x in self.promised.items()
+        )
+        reach = self.design.original.length
+        return same and self.residual <= _EXACT and all(w.overhang <= _SAME * reach for w in self.weights)
+
+    @property
+    def claim(self) -> str:
+        """What can be said of it, in words."""
+        d = self.design
+        if not self.attained:
+            return "the pieces do not have what the design asks for: take the realised figures"
+        if d.status == "optimal":
+            return f"optimal: no counterweights of this kind are better than {d.dual_bound:.9g}"
+        return f"not proved optimal: objective {d.objective:.9g}, none of this kind is better than {d.dual_bound:.9g}"
+
+    def _measured(self, name: str) -> float:
+        d, pi = self.design, self.parameters
+        if name == "added_mass":
+            return float(pi[:, 0].sum()) - d.original.mass
+        if name == "inertia":
+            assert d.asked is not None
+            return float(reflected_inertia(d.original, d.asked.given.paths) @ pi.reshape(-1))
+        if name == "distance":
+            difference = d.space.of(pi - d.original.inertial_parameters).reshape(-1)
+            return float(np.linalg.norm(difference / (d.space.scale * (d.original.mass or 1.0))))
+        measured = measure_of(name)
+        assert measured is not None
+        value = getattr(d.rows[measured], base(name).split("_")[0])(pi)
+        return float(value**2 if name.startswith("mean_square_") else value)
+
+    @cached_property
+    def chain(self) -> ClosedChain:
+        """The mechanism with its counterweights and their arms, drawn in a colour of their own."""
+        original = self.design.original
+        chain = _with_frames(original, [w.body for w in self.weights]).with_inertial_parameters(self.parameters)
+        drawn = [visual for w in self.weights for visual in _visuals(chain, w)]
+        return replace(chain, visuals=(*chain.visuals, *drawn))
 
 
 def realise(
-    design: Design, *, shape: str = "disc", material: str | float = "steel", thickness: float | None = None
+    design: Design,
+    *,
+    shape: str | None = None,
+    material: str | float | None = None,
+    thickness: float | None = None,
+    arm: float | None = None,
 ) -> Realisation:
     """Turn added material into counterweights.
 
+    A design that was solved in pieces is made of them. Any other is solved again in pieces of the kind asked for, so
+    that what is made is the best that can be made, and not the nearest to something that cannot.
+
     Args:
         design: of `balance` in mode "add".
-        shape: "disc" or "bar" for planar mechanisms, "ball" for any; a ball has the inertia that it has.
-        material: one of `MATERIALS`, or a density [kg/m3].
+        shape: "disc" or "bar" for planar mechanisms, "ball" for any; a ball has the inertia that it has. A disc, or
+            in space a ball, unless given.
+        material: one of `MATERIALS`, or a density [kg/m3]; steel unless given.
         thickness: along the normal of the plane [m]; a fifth of the chain's characteristic length unless given.
+        arm: width of the arms [m]; a fifth of the outer radius of the counterweight unless given, 0 for none.
 
     Raises:
         UnknownNameError: a shape or material that is not known.
         InvalidInputError: a redesign (nothing is added), a flat piece on a spatial mechanism, a bad thickness.
-        InfeasibleError: there is no design.
+        InfeasibleError: there is no design, or none in such pieces.
+        SolverError: neither counterweights of this kind nor a proof that there are none.
     """
-    if shape not in SHAPES:
-        raise UnknownNameError("shape", shape, SHAPES)
-    density = _density(material)
     _ = design.chain  # raises when infeasible
-    space = design.space
     if design.mode != "add":
         raise InvalidInputError("design", design.mode, "must be of mode 'add' to be made by counterweights")
-    if shape != "ball" and not space.planar:
-        raise InvalidInputError("shape", shape, "needs a planar mechanism", "Use shape='ball'.")
-    thick = 0.2 * design.original.length if thickness is None else thickness
-    if not (isinstance(thick, (int, float, np.number)) and np.isfinite(thick) and thick > 0.0):
-        raise InvalidInputError("thickness", thickness, "must be positive and finite [m]")
-    made = [_make(c, space, shape, density, float(thick)) for c in design.added if c.mass > 0.0]
+    own = all(c.body in design.pieces for c in design.added)
+    if (shape, material, thickness, arm) != (None, None, None, None) or not own:
+        word = shape or ("disc" if design.space.planar else "ball")
+        piece = piece_of(design.original, word, material, thickness, arm)
+        if not own or not all(_alike(piece, other) for other in design.pieces.values()):
+            design = _solved_in(design, piece)
+            _ = design.chain
+    made = [_make(design, c) for c in design.added if c.mass > 0.0]
     return Realisation(design, tuple(made))
+
+
+def piece_of(
+    chain: ClosedChain,
+    shape: str,
+    material: str | float | None,
+    thickness: float | None,
+    arm: float | None,
+) -> Piece:
+    """Return the kind of piece that these words stand for; arguments as for `realise`."""
+    if shape not in SHAPES:
+        raise UnknownNameError("shape", shape, SHAPES)
+    stuff = "steel" if material is None else material
+    if shape == "ball":
+        return Sphere(density_of(stuff), arm)
+    thick = THICKNESS * chain.length if thickness is None else positive("thickness", thickness, "m")
+    return (Disc if shape == "disc" else Bar)(density_of(stuff), thick, arm=arm)
+
+
+def _alike(asked: Piece, made: Piece) -> bool:
+    """Return whether a piece is of the kind asked for; its line and arm are its own."""
+    if type(asked) is not type(made) or density_of(asked.density) != density_of(made.density):
+        return False
+    thin = isinstance(asked, Sphere) or isinstance(made, Sphere) or asked.thickness == made.thickness
+    return thin and (asked.arm is None or asked.arm == made.arm)
+
+
+def _solved_in(design: Design, piece: Piece) -> Design:
+    asked = design.asked
+    if asked is None:
+        raise InvalidInputError("design", design.status, "must come from balance, to be solved again in pieces")
+    problem = assembled(replace(asked.given, counterweight=piece))
+    return replace(
+        problem.solve(asked.minimise, limits=asked.limits),
+        alternatives=design.alternatives,
+    )
 
 
 def flat_size(shape: str, mass: float, inertia: float, density: float, thickness: float) -> tuple[float, float]:
@@ -146,35 +273,87 @@ def flat_size(shape: str, mass: float, inertia: float, density: float, thickness
         total = max(2.0 * inertia / mass, area / np.pi)  # r^2 + b^2
         difference = area / np.pi
         bore = total - difference
-        return float(np.sqrt(0.5 * (total + difference))), float(np.sqrt(0.5 * bore)) if bore > 1e-6 * total else 0.0
+        return float(np.sqrt(0.5 * (total + difference))), float(np.sqrt(0.5 * bore)) if bore > _BORED * total else 0.0
     squares = max(12.0 * inertia / mass, 2.0 * area)  # l^2 + w^2
     plus, minus = np.sqrt(squares + 2.0 * area), np.sqrt(max(squares - 2.0 * area, 0.0))
     return float(0.5 * (plus + minus)), float(0.5 * (plus - minus))
 
 
-def _make(change: Change, space: Space, shape: str, density: float, thickness: float) -> Counterweight:
-    b = space.bodies.index(change.body)
-    m = change.mass
+def _make(design: Design, change: Change) -> Counterweight:
+    space = design.space
+    piece, b, m = design.pieces[change.body], space.bodies.index(change.body), change.mass
+    density, shape = density_of(piece.density), next(k for k, kind in SHAPES.items() if isinstance(piece, kind))
     axes = np.array(space.axes[b])
     pose = np.eye(4)
     pose[:3, 3] = change.place
-    if shape == "ball":
-        r = float(np.cbrt(0.75 * m / (np.pi * density)))
+    if isinstance(piece, Sphere):
+        r = radius = float(np.cbrt(0.75 * m / (np.pi * density)))
         size: tuple[float, ...] = (r,)
         inertia = np.eye(3) * 0.4 * m * r * r
     else:
         wanted = float(axes[2] @ change.inertia @ axes[2])
-        long, short = flat_size(shape, m, wanted, density, thickness)
-        size = (long, short, thickness)
+        long, short = flat_size(shape, m, wanted, density, piece.thickness)
+        size = (long, short, piece.thickness)
+        radius = long if shape == "disc" else 0.5 * float(np.hypot(long, short))
         x = _along(change.place, axes)
         pose[:3, :3] = np.column_stack([x, np.cross(axes[2], x), axes[2]])
         own = _own_inertia(shape, m, size)
         inertia = pose[:3, :3] @ np.diag(own) @ pose[:3, :3].T
     pi = np.array(pin.Inertia(m, change.place, inertia).toDynamicParameters())
+    arm = next((a for a in design.arms if a.body == change.body), None)
+    return Counterweight(
+        change.body,
+        shape,
+        density,
+        size,
+        frozen(pose),
+        frozen(pi),
+        _deviation(space, b, pi - change.parameters),
+        radius,
+        _overhang(design, b, change.place, radius),
+        arm,
+        () if arm is None else _arm_size(piece, arm, radius),
+    )
+
+
+def _deviation(space: Space, b: int, difference: Array) -> Array:
     T = space.selection()[b * space.width : (b + 1) * space.width, 10 * b : 10 * (b + 1)]
-    off = np.abs(T @ (pi - change.parameters))
-    deviation = [off[space.orders == k].max() for k in (0.0, 1.0, 2.0)]
-    return Counterweight(change.body, shape, density, size, frozen(pose), frozen(pi), frozen(deviation))
+    off = np.abs(T @ difference)
+    return frozen([off[space.orders == k].max() for k in (0.0, 1.0, 2.0)])
+
+
+def _arm_size(piece: Piece, arm: Change, radius: float) -> tuple[float, ...]:
+    """Return length, width and thickness of an arm [m]."""
+    width = arm_width(piece, radius)
+    thickness = width if isinstance(piece, Sphere) else piece.thickness
+    return (arm.mass / (density_of(piece.density) * width * thickness), width, thickness)
+
+
+def _overhang(design: Design, b: int, place: Array, radius: float) -> float:
+    """Return how far a round piece sticks out of its region [m], asked of the points of its rim."""
+    assert design.asked is not None
+    given, chain, space = design.asked.given, design.original, design.space
+    own = given.region.get(chain.joints[b]) if isinstance(given.region, Mapping) else given.region
+    shape = resolve(own or Ball(chain.length), chain, b, space.axes[b], planar=space.planar, unit=1.0)
+    center = np.array(space.axes[b])[:2] @ place if space.planar else place
+    off = shape.axes @ (center - shape.center)
+    away = off / np.linalg.norm(off) if off.any() else np.eye(off.size)[0]
+    points = off + radius * np.vstack([_directions(off.size), away, np.eye(off.size), -np.eye(off.size)])
+    semi = shape.semi_axes
+    if shape.kind == "box":
+        return max(0.0, float((np.abs(points) - semi).max()))
+    return max(0.0, float((np.linalg.norm(points / semi, axis=1).max() - 1.0) * semi.min()))
+
+
+def _directions(d: int) -> Array:
+    """Return unit vectors spread over the circle (d = 2) or the sphere."""
+    k = np.arange(_RIM)
+    if d == 2:
+        angle = 2.0 * np.pi * k / _RIM
+        return np.column_stack([np.cos(angle), np.sin(angle)])
+    z, turn = 1.0 - (2.0 * k + 1.0) / _RIM, np.pi * (1.0 + np.sqrt(5.0)) * k
+    r = np.sqrt(1.0 - z * z)
+    return np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
 
 
 def _own_inertia(shape: str, m: float, size: tuple[float, ...]) -> Array:
@@ -191,16 +370,6 @@ def _along(place: Array, axes: Array) -> Array:
     flat = place - axes[2] * float(axes[2] @ place)
     size = float(np.linalg.norm(flat))
     return np.asarray(flat / size if size > 1e-12 else axes[0])
-
-
-def _density(material: str | float) -> float:
-    if isinstance(material, str):
-        if material not in MATERIALS:
-            raise UnknownNameError("material", material, MATERIALS)
-        return MATERIALS[material]
-    if not (isinstance(material, (int, float, np.number)) and np.isfinite(material) and material > 0.0):
-        raise InvalidInputError("density", material, "must be positive and finite [kg/m3]")
-    return float(material)
 
 
 def _frame_of(chain: ClosedChain, joint: str) -> pin.Frame | None:
@@ -220,12 +389,22 @@ def _with_frames(chain: ClosedChain, joints: list[str]) -> ClosedChain:
     return replace(chain, model=model)
 
 
-def _visual(chain: ClosedChain, w: Counterweight) -> Visual:
+def _visuals(chain: ClosedChain, w: Counterweight) -> list[Visual]:
+    """Return the piece, and its arm up to the rim."""
     frame = _frame_of(chain, w.body)
     assert frame is not None
-    placement = np.asarray(frame.placement.inverse().homogeneous) @ w.pose
-    if w.shape == "ball":
-        return Visual(frame.name, "sphere", w.size, placement, COLOUR)
-    a, b, t = w.size
-    size = (a, t) if w.shape == "disc" else (a, b, t)
-    return Visual(frame.name, "cylinder" if w.shape == "disc" else "box", size, placement, COLOUR)
+    into = np.asarray(frame.placement.inverse().homogeneous)
+    shape, size = {
+        "ball": ("sphere", w.size),
+        "disc": ("cylinder", (w.size[0], w.size[-1])),
+        "bar": ("box", w.size),
+    }[w.shape]
+    out = [Visual(frame.name, shape, size, into @ w.pose, COLOUR)]
+    if w.arm is not None:
+        x = w.arm.place - w.pose[:3, 2] * float(w.pose[:3, 2] @ w.arm.place) if w.shape != "ball" else w.arm.place
+        x = x / np.linalg.norm(x)
+        z = w.pose[:3, 2] if w.shape != "ball" else across(x)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = np.column_stack([x, np.cross(z, x), z]), w.arm.place
+        out.append(Visual(frame.name, "box", w.arm_size, into @ pose, COLOUR))
+    return out

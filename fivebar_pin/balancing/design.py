@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -13,9 +14,13 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import Rows
 from fivebar_pin.balancing.conditions import BalanceConditions
+from fivebar_pin.balancing.pieces import Piece
 from fivebar_pin.balancing.solvers import Certificate
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InfeasibleError
+
+if TYPE_CHECKING:
+    from fivebar_pin.balancing._given import Given
 
 __all__ = ["Certificate", "Change", "Design"]
 
@@ -39,12 +44,21 @@ class Change:
     parameters: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Asked:
+    """What a design answers: the problem, the weights of its terms, and limits besides those of the problem."""
+
+    given: Given
+    minimise: Mapping[str, float]
+    limits: Mapping[str, float]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Design:
     """A balanced mechanism, optimal for the objective, or the proof that there is none.
 
     Attributes:
-        status: "optimal" or "infeasible".
+        status: "optimal", "feasible" (a design, with a bound on how much better another could be) or "infeasible".
         original: the chain that was to be balanced.
         kind: what is exact, or None.
         mode: "add" or "redesign".
@@ -62,6 +76,9 @@ class Design:
         branch: configuration (nq,) of the branch that the design is for; None when it serves all assembly modes.
         alternatives: configurations (nq,) of all branches with a design of their own, found where there is none for
             all assembly modes together; pass one as `near`.
+        pieces: what the material added to a body is made as, by joint; empty where it may be anything.
+        arms: what carries these pieces; part of `parameters`, and of the added mass.
+        asked: what was asked for.
     """
 
     status: str
@@ -80,6 +97,9 @@ class Design:
     certificate: Certificate | None = None
     branch: Array | None = None
     alternatives: tuple[Array, ...] = ()
+    pieces: Mapping[str, Piece] = field(default_factory=dict)
+    arms: tuple[Change, ...] = ()
+    asked: Asked | None = None
 
     def __repr__(self) -> str:
         if not self.feasible:
@@ -93,12 +113,16 @@ class Design:
 
     def __str__(self) -> str:
         lines = [repr(self)]
+        if self.material:
+            lines.append(f"  material: {self.material}")
+        length = self.original.length
         for sign, changes in (("+", self.added), ("-", self.removed)):
             for c in changes:
                 if c.mass == 0.0:
                     continue
-                place = ", ".join(f"{x:.5g}" for x in c.place)
+                place = ", ".join(f"{x:.5g}" for x in np.round(c.place / length, 9) * length + 0.0)
                 lines.append(f"  {sign} {c.body}: {c.mass:.6g} kg at ({place}) m")
+        lines += [f"  + {c.body}: arm of {c.mass:.6g} kg" for c in self.arms]
         if self.feasible:
             lines += [f"  {k}: {self.before[k]:.5g} -> {self.after[k]:.5g}" for k in self.before]
         return "\n".join(lines)
@@ -106,7 +130,16 @@ class Design:
     @property
     def feasible(self) -> bool:
         """Whether there is a design."""
-        return self.status == "optimal"
+        return self.status != "infeasible"
+
+    @property
+    def material(self) -> str:
+        """How dense the material may be, in words; empty where that was not asked."""
+        density = None if self.asked is None else self.asked.given.density
+        if density is None:
+            return ""
+        thick = f", {1e3 * density[1]:.4g} mm thick" if self.space.planar else ""
+        return f"no denser than {density[0]:g} kg/m3{thick}"
 
     @property
     def gap(self) -> float:

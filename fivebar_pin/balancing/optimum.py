@@ -15,8 +15,9 @@ from fivebar_pin.balancing._setup import MassBounds
 from fivebar_pin.balancing.branches import Branch, branches, configurations_meant
 from fivebar_pin.balancing.conditions import balance_conditions
 from fivebar_pin.balancing.design import Design
+from fivebar_pin.balancing.pieces import Piece
 from fivebar_pin.balancing.problem import balance_problem
-from fivebar_pin.balancing.regions import Disc, Region
+from fivebar_pin.balancing.regions import Region
 from fivebar_pin.balancing.solvers import DEFAULT
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
@@ -33,7 +34,9 @@ def balance(
     mode: Literal["add", "redesign"] = "add",
     region: Region | Mapping[str, Region] | None = None,
     masses: MassBounds = None,
-    counterweight: Disc | Mapping[str, Disc] | None = None,
+    material: str | float | None = "steel",
+    thickness: float | None = None,
+    counterweight: Piece | Mapping[str, Piece] | None = None,
     remove: Sequence[str] = (),
     motions: Motions = (),
     limits: Mapping[str, npt.ArrayLike] | None = None,
@@ -60,9 +63,15 @@ def balance(
         masses: bounds (low, high) [kg] on the mass added to a body, or of a redesigned body; one for all or by body.
             A redesigned body keeps between half and twice its mass, and a body gets at most ten times the moving
             mass, unless given.
-        counterweight: discs that the added material must be makeable as, one kind for all bodies or by body; planar
-            mechanisms only. See `realise`.
-        remove: bodies that material may also be taken from, up to half of their mass.
+        material: no material is denser than this, added, removed or redesigned: a name of `MATERIALS`, a density
+            [kg/m3], or None for points of mass. In the plane I_c >= m^2 / (2 pi density thickness) about the mass
+            centre, in space det(S_c)^(1/3) >= k m^(5/3) (see `pieces`).
+        thickness: of material in planar mechanisms [m]; a fifth of the chain's characteristic length unless given.
+        counterweight: what the added material is made as, one kind for all bodies or by body: a `Disc` or a `Bar` in
+            planar mechanisms, a `Sphere` in all. The whole piece lies in its region, and the arm that carries it is
+            part of the design. See `realise`.
+        remove: bodies that material may also be taken from, up to half of their mass; what is left is a body, in
+            space too.
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
         gravity, about, near, space, seed: as for `balance_conditions`.
@@ -93,6 +102,8 @@ def balance(
             mode=mode,
             region=region,
             masses=masses,
+            material=material,
+            thickness=thickness,
             counterweight=counterweight,
             remove=remove,
             motions=motions,

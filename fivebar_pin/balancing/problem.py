@@ -13,14 +13,16 @@ below, and if there is no design a certificate proves it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
-from fivebar_pin.balancing import _empty, _lift
+from fivebar_pin.balancing import _empty, _extent, _lift
+from fivebar_pin.balancing._given import Given
+from fivebar_pin.balancing._making import Maker, Sizes
 from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing._objective import TermMaker, weights_of
 from fivebar_pin.balancing._parameters import Space
@@ -29,8 +31,9 @@ from fivebar_pin.balancing._sampling import SpaceName, random_samples, space_of
 from fivebar_pin.balancing._setup import MassBounds, Setup
 from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, positive_limit
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, balance_conditions
-from fivebar_pin.balancing.design import Design
-from fivebar_pin.balancing.regions import Disc, Region
+from fivebar_pin.balancing.design import Asked, Design
+from fivebar_pin.balancing.pieces import THICKNESS, Piece, density_of, positive
+from fivebar_pin.balancing.regions import Region
 from fivebar_pin.balancing.solvers import DEFAULT, SECOND, Block, Certificate, Outcome, Program, solve, solver_named
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError, UnknownNameError
@@ -41,11 +44,12 @@ _MARGINS = (1e-9, 1e-8, 1e-7, 1e-6)  # how far inside the cones a design is kept
 _GIVE = ((1e-9, 1e-8), (1e-8, 1e-7))  # margin, and how far regions give way where nothing else is left, the same
 _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
+_FELT = 1e-12  # factor of an inertia that counts as zero in the conditions and terms of a scaled problem [-]
 _PHYSICAL = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Asked:
+class _Task:
     """One objective over a problem: a program, its cost in units, what that stands for, and who solves it."""
 
     program: Program
@@ -53,6 +57,7 @@ class _Asked:
     q: Array
     unit: float
     weights: Mapping[str, float]
+    limits: tuple[Block, ...]
     solver: str
 
     def solve(self, *, margin: float = 0.0, give: float = 0.0) -> Outcome:
@@ -81,11 +86,14 @@ class BalanceProblem:
         E, X0: scaled parameters (nb * width,) = X0 + E y, y the variables (n,) of all materials.
         program: conditions, physical bodies, regions, bounds.
         fixed: rows (k, n + 1) of masses that are given exactly.
+        limited: upper bounds on terms, part of the program.
         caps: bounds on added masses that have none of their own.
         mass: unit of mass [kg].
         sizes: bounds on the variables (n,) that follow from those on masses and the regions.
         near: configuration (nq,) of the one branch that is balanced, or None.
-        solver: name of the solver.
+        given: what the problem was made from.
+        arms: parameters (nb, 10) of the arms that carry counterweights, part of the present bodies.
+        pieces: what the material added to a body is made as, by its index; empty for any material.
     """
 
     chain: ClosedChain
@@ -102,11 +110,14 @@ class BalanceProblem:
     X0: Array = field(repr=False)
     program: Program = field(repr=False)
     fixed: Array = field(repr=False)
+    limited: tuple[Block, ...] = field(repr=False)
     caps: tuple[Block, ...] = field(repr=False)
     mass: float
     sizes: Array = field(repr=False)
     near: Array | None
-    solver: str = DEFAULT
+    given: Given = field(repr=False)
+    arms: Array = field(repr=False)
+    pieces: dict[int, Piece]
 
     @property
     def n(self) -> int:
@@ -127,6 +138,8 @@ class BalanceProblem:
     ) -> Design:
         """Solve for other weights, or further upper bounds, of the prepared objectives.
 
+        Counterweights of a stated kind are found in steps that each give something that can be made.
+
         Args:
             minimise, limits: as for `balance`.
             solver: one of `solvers.SOLVERS`; the one the problem was prepared for unless given.
@@ -136,29 +149,45 @@ class BalanceProblem:
             SolverError: no solution to the tolerance and no proof either.
         """
         weights = weights_of(minimise, self.mode)
-        solver = solver or self.solver
-        for name in (*weights, *(limits or {})):
+        if solver is not None:
+            solver_named(solver)
+            return replace(self, given=replace(self.given, solver=solver)).solve(minimise, limits=limits)
+        further = dict(limits or {})
+        for name in (*weights, *further):
             if base(name) not in self.terms:
                 raise UnknownNameError("prepared objective", name, self.terms)
+        asked = Asked(self.given, weights, further)
+        if not self.pieces:
+            return replace(self._optimum(weights, further), asked=asked)
+
+        def solved(sizes: Sizes, arms: Array, without: frozenset[int]) -> Design:
+            kept = tuple(b for b in self.given.bodies if b not in without)
+            return assembled(replace(self.given, bodies=kept), sizes, arms)._optimum(weights, further)
+
+        rooms = {m.body: m.room * self.space.length for m in self.materials if m.sign > 0}
+        design = Maker(self.chain, self.space, self.pieces, rooms, solved).search()
+        named = {self.chain.joints[b]: piece for b, piece in self.pieces.items()}
+        return replace(design, asked=asked, pieces=named)
+
+    def _optimum(self, weights: Mapping[str, float], limits: Mapping[str, float]) -> Design:
+        """Return the optimum, or the proof that there is none."""
         limited = [
-            block
-            for name, top in (limits or {}).items()
-            for block in self.terms[base(name)].bounded(positive_limit(name, top))
+            block for name, top in limits.items() for block in self.terms[base(name)].bounded(positive_limit(name, top))
         ]
         bounds = [*self.program.blocks, *limited]
         P, q, unit, epigraphs, sizes = self._objective(weights)
         program = Program(P.size, [*bounds, *self.caps, *epigraphs], sizes)
-        asked = _Asked(program, P, q, unit, weights, solver)
+        asked = _Task(program, P, q, unit, weights, tuple(limited), self.given.solver)
         design = self._inside(asked)
         if design is not None:
             return design
         outcome = asked.solve()
         if outcome.x is None:
-            return self._infeasible(self._proof(bounds, solver) or outcome.certificate)
+            return self._infeasible(self._proof(bounds) or outcome.certificate)
         design, problem = self._finish(outcome, asked)
         return design or self._on_the_boundary(asked, problem)
 
-    def _inside(self, asked: _Asked) -> Design | None:
+    def _inside(self, asked: _Task) -> Design | None:
         """Return the design that is kept a hair inside the cones, by the least margin that makes it physical."""
         for margin in _MARGINS:
             try:
@@ -172,7 +201,7 @@ class BalanceProblem:
                 return design
         return None
 
-    def _on_the_boundary(self, asked: _Asked, problem: str) -> Design:
+    def _on_the_boundary(self, asked: _Task, problem: str) -> Design:
         """Return a design where bodies are points or sheets on the boundary of their regions, which give way by a hair.
 
         Raises:
@@ -189,11 +218,11 @@ class BalanceProblem:
             "bodies shrink to points, or only as a limit. Loosen the bounds or the regions."
         )
 
-    def _proof(self, bounds: Sequence[Block], solver: str) -> Certificate | None:
+    def _proof(self, bounds: Sequence[Block]) -> Certificate | None:
         """Return a proof that does without the caps on masses, which says more, if there is one."""
         try:
             nothing = np.zeros(self.n)
-            return solve(Program(self.n, bounds, self.sizes), nothing, nothing, solver=solver).certificate
+            return solve(Program(self.n, bounds, self.sizes), nothing, nothing, solver=self.given.solver).certificate
         except SolverError:
             return None
 
@@ -217,11 +246,12 @@ class BalanceProblem:
         sizes = np.concatenate([self.sizes, [self.terms[name].largest(self.sizes) for name in used]])
         return P / unit, q / unit, unit, blocks, sizes
 
-    def _finish(self, outcome: Outcome, asked: _Asked) -> tuple[Design | None, str]:
+    def _finish(self, outcome: Outcome, asked: _Task) -> tuple[Design | None, str]:
         """Make a solution exact and check it; None and the reason when it is not physical."""
         assert outcome.x is not None
+        x = self._compact(outcome.x[: self.n], asked.weights, asked.limits)
         for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
-            y, residual = self._exact(outcome.x[: self.n], drop)
+            y, residual = self._exact(x, drop)
             parts = _lift.lift(self, y)
             if residual <= _EXACT and parts.lowest >= -_PHYSICAL:
                 break
@@ -251,6 +281,20 @@ class BalanceProblem:
             branch=self.near,
         )
         return design, ""
+
+    def _compact(self, y: Array, weights: Mapping[str, float], limits: Sequence[Block]) -> Array:
+        """Return the variables with the least inertia that a piece can have, where nothing depends on it."""
+        rows = [b.G for b in (*self.limited, *limits)]
+        rows += [G for name in weights for G, _ in self.terms[base(name)].vectors]
+        if self.conditions is not None:
+            rows.append(self.conditions.rows @ self.E)
+        felt = np.max([np.abs(G).max(axis=0, initial=0.0) for G in rows], axis=0) > _FELT
+        y = np.array(y)
+        for m in self.materials:
+            own = slice(m.start, m.start + m.size)
+            if m.sign > 0 and not felt[own][m.inertias].any():
+                y[own] = m.compact(y[own])
+        return y
 
     def _exact(self, y: Array, drop: float) -> tuple[Array, float]:
         """Move y onto the conditions by the smallest step, measured in shares of each body's own material.
@@ -299,7 +343,9 @@ def balance_problem(
     mode: Literal["add", "redesign"] = "add",
     region: Region | Mapping[str, Region] | None = None,
     masses: MassBounds = None,
-    counterweight: Disc | Mapping[str, Disc] | None = None,
+    material: str | float | None = "steel",
+    thickness: float | None = None,
+    counterweight: Piece | Mapping[str, Piece] | None = None,
     remove: Sequence[str] = (),
     motions: Motions = (),
     limits: Mapping[str, npt.ArrayLike] | None = None,
@@ -325,60 +371,89 @@ def balance_problem(
         own = conditions.space
     else:
         own = space_of(chain, random_samples(chain, 50, near=near, seed=seed), space)
-    setup = Setup(chain, own, conditions, mode)
+    nothing = np.zeros((len(chain.joints), 10))
+    setup = Setup(chain, own, conditions, mode, nothing)
     setup.check_physical()
-    materials = setup.materials(setup.chosen(bodies), region, setup.removable(remove), counterweight)
+    chosen, removable = setup.chosen(bodies), setup.removable(remove)
     paths = trajectories(chain, motions, near)
     wanted = {measure_of(t) for t in (*objectives, *(limits or {}))} - {None}
     if paths:
         wanted |= {"torque", "shaking_force", "shaking_moment"}
     rows = {m: measure(chain, paths, m, about=point, normal=own.normal) for m in MEASURES if m in wanted}
-    E, X0 = setup.map(materials)
-    unit = (own.scale * setup.mass)[:, None]
-    to_pi = own.injection()
-    start = chain.inertial_parameters.reshape(-1) - to_pi @ own.of(chain.inertial_parameters).reshape(-1)
-    full_E, full_0 = to_pi @ (unit * E), start + to_pi @ (unit[:, 0] * X0)
-    names = list(dict.fromkeys(base(t) for t in objectives))
-    n = E.shape[1]
-    maker = TermMaker(chain, setup, rows, paths, E, X0, full_E, full_0)
-    terms = {name: maker.make(name) for name in names}
-    blocks = setup.constraints(materials, E, X0, masses) + maker.limits(limits or {})
-    gone = _empty.empty(blocks, materials, n)
-    blocks = _empty.without(blocks, materials, gone, n)
-    caps = tuple(setup.caps(materials, masses, n))
-    return BalanceProblem(
+    given = Given(
         chain=chain,
         kind=kind,
         conditions=conditions,
         space=own,
         mode=mode,
-        materials=tuple(materials),
-        gone=gone,
-        terms=terms,
-        rows=rows,
+        objectives=tuple(dict.fromkeys(base(t) for t in objectives)),
+        bodies=tuple(chosen),
+        removable=tuple(removable),
+        region=region,
+        masses=masses,
+        counterweight=counterweight,
+        density=stuff(chain, material, thickness),
         limits=dict(limits or {}),
-        E=frozen(E),
-        X0=frozen(X0),
-        program=Program(n, blocks),
-        fixed=frozen(setup.fixed(materials, masses, n)),
-        caps=caps,
-        mass=setup.mass,
-        sizes=frozen(_sizes(materials, gone, [*blocks, *caps], n)),
+        paths=paths,
+        rows=rows,
         near=None if near is None else checked("near", near, (chain.nq,)),
         solver=solver,
     )
+    return assembled(given)
 
 
-def _sizes(materials: Sequence[Material], gone: Sequence[bool], blocks: Sequence[Block], n: int) -> Array:
-    """Return bounds on the variables (n,): the heaviest mass that single rows allow, and its moments."""
-    heaviest = np.full(n, np.inf)
-    for block in blocks:
-        if block.cone not in ("zero", "nonneg"):
-            continue
-        single = np.count_nonzero(block.G, axis=1) == 1
-        for row, offset in zip(block.G[single], block.g[single], strict=True):
-            k = int(np.argmax(row != 0.0))
-            if row[k] < 0.0 or block.cone == "zero":
-                heaviest[k] = min(heaviest[k], max(0.0, -offset / row[k]))
-    sizes = [np.zeros(m.size) if g else m.sizes(heaviest[m.start]) for m, g in zip(materials, gone, strict=True)]
-    return np.concatenate(sizes) if sizes else np.zeros(0)
+def stuff(chain: ClosedChain, material: str | float | None, thickness: float | None) -> tuple[float, float] | None:
+    """Return density [kg/m3] and thickness [m] of the material, or None for any density."""
+    thick = THICKNESS * chain.length if thickness is None else positive("thickness", thickness, "m")
+    return None if material is None else (density_of(material), thick)
+
+
+def assembled(given: Given, sizes: Sizes | None = None, arms: Array | None = None) -> BalanceProblem:
+    """Put the problem together.
+
+    Args:
+        given: what it is made from.
+        sizes: by index of the body, about which its counterweight is bounded in size from above; from below without.
+        arms: inertial parameters (nb, 10) of arms that are part of the bodies; none unless given.
+    """
+    chain, space = given.chain, given.space
+    arms = np.zeros((len(chain.joints), 10)) if arms is None else arms
+    setup = Setup(chain, space, given.conditions, given.mode, arms)
+    materials = setup.materials(
+        given.bodies, given.removable, given.region, given.counterweight, given.density, sizes or {}
+    )
+    E, X0 = setup.map(materials)
+    present = chain.inertial_parameters + arms
+    unit = (space.scale * setup.mass)[:, None]
+    to_pi = space.injection()
+    start = present.reshape(-1) - to_pi @ space.of(present).reshape(-1)
+    full_E, full_0 = to_pi @ (unit * E), start + to_pi @ (unit[:, 0] * X0)
+    n = E.shape[1]
+    maker = TermMaker(chain, setup, dict(given.rows), given.paths, E, X0, full_E, full_0)
+    limited = maker.limits(given.limits)
+    blocks, caps = setup.constraints(materials, E, X0, given.masses), tuple(setup.caps(materials, given.masses, n))
+    gone = _empty.empty(blocks, materials, n)
+    return BalanceProblem(
+        chain=chain,
+        kind=given.kind,
+        conditions=given.conditions,
+        space=space,
+        mode=given.mode,
+        materials=tuple(materials),
+        gone=gone,
+        terms={name: maker.make(name) for name in given.objectives},
+        rows=dict(given.rows),
+        limits=dict(given.limits),
+        E=frozen(E),
+        X0=frozen(X0),
+        program=Program(n, _empty.without([*blocks, *limited], materials, gone, n)),
+        fixed=frozen(setup.fixed(materials, given.masses, n)),
+        limited=tuple(limited),
+        caps=caps,
+        mass=setup.mass,
+        sizes=frozen(_extent.extents(materials, gone, [*blocks, *caps], n)),
+        near=given.near,
+        given=given,
+        arms=frozen(arms),
+        pieces={b: piece for b in given.bodies if (piece := setup.piece(b, given.counterweight)) is not None},
+    )

@@ -20,7 +20,7 @@ from fivebar_pin._arrays import Array, checked, frozen
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
-__all__ = ["Ball", "Box", "Disc", "Ellipsoid", "Region"]
+__all__ = ["Ball", "Box", "Ellipsoid", "Region"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,52 +93,6 @@ class Ellipsoid:
 
 
 Region = Ball | Box | Ellipsoid
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Disc:
-    """Counterweights that can be made as flat discs, solid or with a bore, of one density and thickness.
-
-    A disc of mass m has at least the inertia m^2 / (2 pi density thickness) about its own centre; with a bore it has
-    more. That bound is convex, so the optimum over all such discs is global too.
-
-    Attributes:
-        density: [kg/m3].
-        thickness: along the normal of the plane [m].
-        line: direction in joint axes (3,) along which the centres must lie, through the joint; anywhere unless given.
-    """
-
-    density: float
-    thickness: float
-    line: npt.ArrayLike | None = None
-
-    def __post_init__(self) -> None:
-        _positive("density of the disc", self.density)
-        _positive("thickness of the disc", self.thickness)
-        if self.line is not None:
-            line = checked("line of the disc", self.line, (3,))
-            if not line.any():
-                raise InvalidInputError("line of the disc", line.tolist(), "must not be zero")
-            object.__setattr__(self, "line", line)
-
-    def scaled(self, axes: Array, mass: float, length: float) -> Solid:
-        """Return the bound for scaled parameters of one body (axes (3, 3): rows e_1, e_2, n)."""
-        across = None
-        if self.line is not None:
-            flat = axes[:2] @ np.asarray(self.line)
-            size = float(np.linalg.norm(flat))
-            if size < 1e-9 * float(np.linalg.norm(self.line)):
-                raise InvalidInputError("line of the disc", np.asarray(self.line).tolist(), "must not leave the plane")
-            across = frozen([-flat[1] / size, flat[0] / size])
-        return Solid(mass / (2.0 * np.pi * self.density * self.thickness * length**2), across)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Solid:
-    """Scaled bound of a disc: inertia about its own centre >= least m^2; centre on the line with this normal (2,)."""
-
-    least: float
-    across: Array | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

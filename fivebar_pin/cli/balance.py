@@ -34,10 +34,11 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     _designing(balance)
     balance.add_argument("--minimise", action="append", metavar="TERM[=WEIGHT]", help="what to minimise; repeatable")
     balance.add_argument("--limit", action="append", metavar="TERM=VALUE", help="upper bound on a term; repeatable")
-    balance.add_argument("--realise", choices=("disc", "bar", "ball"), help="make counterweights of this shape")
-    balance.add_argument("--material", default="steel", help="of the counterweights: a name, or kg/m3 [steel]")
     balance.add_argument(
-        "--thickness", type=float, help="of flat counterweights [m]; a fifth of the mechanism's length"
+        "--realise", choices=("disc", "bar", "ball"), help="solve for counterweights of this shape, and make them"
+    )
+    balance.add_argument(
+        "--arm", type=float, help="width of the arms that carry them [m]; 0: none [a fifth of a radius]"
     )
     balance.add_argument("--out", metavar="FOLDER", help="write the design, the curves and a page before / after there")
     balance.add_argument("--overwrite", action="store_true", help="replace files that exist already")
@@ -79,7 +80,9 @@ def run_balance(chosen: argparse.Namespace) -> int:
     limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
     console = _tables.console()
     with console.status("balancing"):
-        design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, **_options(chosen, trajectory))
+        options = _options(chosen, trajectory)
+        piece = _piece(chosen, chain)
+        design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, counterweight=piece, **options)
     if not design.feasible:
         console.print(repr(design), markup=False, soft_wrap=True)
         return 1
@@ -134,6 +137,10 @@ def _designing(parser: argparse.ArgumentParser) -> None:
         "--masses", type=float, nargs=2, metavar=("LOW", "HIGH"), help="bounds on each added mass or new body [kg]"
     )
     parser.add_argument("--remove", nargs="+", default=(), metavar="JOINT", help="bodies that may lose material too")
+    parser.add_argument(
+        "--material", default="steel", help="nothing is denser: a name, kg/m3, or 'none' for points of mass [steel]"
+    )
+    parser.add_argument("--thickness", type=float, help="of flat material [m] [a fifth of the mechanism's length]")
     parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
     parser.add_argument("--solver", choices=SOLVERS, default=SOLVERS[0], help=f"of the conic program [{SOLVERS[0]}]")
     parser.add_argument(
@@ -159,6 +166,8 @@ def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, An
         "mode": chosen.mode,
         "bodies": chosen.bodies,
         "region": None if chosen.radius is None else Ball(chosen.radius),
+        "material": _material(chosen),
+        "thickness": chosen.thickness,
         "masses": None if chosen.masses is None else tuple(chosen.masses),
         "remove": chosen.remove,
         "motions": [trajectory],
@@ -166,6 +175,29 @@ def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, An
         "near": trajectory.q[0] if chosen.branch == "motion" else None,
         "solver": chosen.solver,
     }
+
+
+def _material(chosen: argparse.Namespace) -> str | float | None:
+    if chosen.material == "none":
+        return None
+    try:
+        return float(chosen.material)
+    except ValueError:
+        return str(chosen.material)
+
+
+def _piece(chosen: argparse.Namespace, chain: ClosedChain) -> Any:
+    """Return what the counterweights are made as, or None for any material."""
+    from fivebar_pin.balancing.counterweights import piece_of
+
+    if chosen.realise is None:
+        if chosen.arm is not None:
+            raise InvalidInputError("--arm", chosen.arm, "has a meaning with --realise only")
+        return None
+    material = _material(chosen)
+    if material is None:
+        raise InvalidInputError("--material", chosen.material, "cannot be made: counterweights have a density")
+    return piece_of(chain, chosen.realise, material, chosen.thickness, chosen.arm)
 
 
 def _pairs(option: str, words: list[str] | None) -> list[tuple[str, float | None]]:
@@ -195,18 +227,18 @@ def _balance(design: Any) -> str:
 
 
 def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedChain:
-    """Return the designed mechanism, with counterweights that can be made when they are asked for."""
-    chain: ClosedChain = design.chain
+    """Return the designed mechanism; made of counterweights, promised beside realised, when they are asked for."""
     if not chosen.realise:
+        chain: ClosedChain = design.chain
         return chain
     from fivebar_pin.balancing import realise
 
-    try:
-        material: str | float = float(chosen.material)
-    except ValueError:
-        material = chosen.material
-    made = realise(design, shape=chosen.realise, material=material, thickness=chosen.thickness)
-    console.print(str(made), markup=False, soft_wrap=True)
+    made = realise(design)
+    for weight in made.weights:
+        console.print(f"  {weight}", markup=False, soft_wrap=True)
+    rows = [[name, f"{x:.6g}", f"{made.terms[name]:.6g}"] for name, x in made.promised.items()]
+    _tables.table(console, "Counterweights", ("", "promised", "realised"), rows)
+    console.print(f"{made.claim}", markup=False, soft_wrap=True)
     return made.chain
 
 
@@ -229,6 +261,7 @@ def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]
         console, "Along the motion (* weight left out)", ("", "before: peak", "RMS", "after: peak", "RMS"), rows
     )
     rows = [
+        ["material", design.material or "any density"],
         ["objective", f"{design.objective:.9g}"],
         ["no design is better than", f"{design.dual_bound:.9g}"],
         ["residual of the conditions, relative", _tables.number(design.residual)],
