@@ -16,7 +16,7 @@ import mechanisms
 import numpy as np
 
 import fivebar_pin as fb
-from fivebar_pin.balancing import BalanceConditions, Ball, Box, Disc, Ellipsoid
+from fivebar_pin.balancing import BalanceConditions, Ball, Box, Ellipsoid
 from fivebar_pin.dynamics import inverse_dynamics
 
 PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # order of the inertia entries in ten parameters
@@ -95,8 +95,9 @@ def draw(rng: np.random.Generator) -> Case:
         heavy = [j for j, m in zip(chain.joints, chain.inertial_parameters[:, 0], strict=True) if m > 0.0]
         if rng.random() < 0.35:
             arguments["remove"] = [str(j) for j in rng.choice(heavy, int(rng.integers(1, len(heavy) + 1)), False)]
-        if _planar(name) and rng.random() < 0.2:
-            arguments["counterweight"] = Disc(float(rng.uniform(2e3, 2e4)), 0.1 * chain.length)
+    arguments["material"] = None
+    if _planar(name) and rng.random() < 0.4:
+        arguments["material"], arguments["thickness"] = float(10.0 ** rng.uniform(3.3, 4.3)), 0.1 * chain.length
     loads = inverse_dynamics(chain, path)
     if rng.random() < 0.25:
         peak = float(np.abs(loads.torque).max())
@@ -208,27 +209,20 @@ class Written:
             masses = tuple(k * self.present[b, 0] * self.M for k in (0.5, 2.0))
         low, high = (0.0, CAP) if masses is None else np.array(masses) / self.M
         self.constraints += [m >= low, m <= high]
-        disc = self.case.arguments.get("counterweight")
-        if disc is not None:
-            self.disc(disc, m, h, S)
+        self.no_denser(m, h, S)
         return pi
 
     def removed(self, b: int) -> Any:
-        cp = self.cp
-        m, h, S, pi = self.body(b)
+        """What is taken from a body is a body in space, and so is what is left, of planar mechanisms too."""
+        cp, E = self.cp, self.axes(b)
+        P = cp.Variable((4, 4), PSD=True)
+        S3, h3, m = P[:3, :3], P[:3, 3], P[3, 3]
+        I3 = cp.trace(S3) * np.eye(3) - S3
+        h, S = E @ h3, E @ S3 @ E.T
         self.inside(b, m, h, S)
-        self.constraints.append(m <= 0.5 * self.present[b, 0])
-        if self.planar:
-            E, n = self.axes(b), np.asarray(self.plane().axes[b, 2])
-            I0 = np.zeros((3, 3))
-            for k, (i, j) in enumerate(PAIRS):
-                I0[i, j] = I0[j, i] = self.present[b, 4 + k]
-            left_m, left_h = self.present[b, 0] - m, E @ self.present[b, 1:4] - h
-            left_I = float(n @ I0 @ n) - cp.trace(S)
-            self.constraints.append(cp.norm(cp.hstack([left_m - left_I, 2 * left_h])) <= left_m + left_I)
-        else:
-            self.constraints.append(self.pseudo(self.present[b]) - self.pseudo(pi) >> 0)
-        return pi
+        self.no_denser(m, h, S)
+        self.constraints += [m <= 0.5 * self.present[b, 0], self.pseudo(self.present[b]) - P >> 0]
+        return cp.hstack([m, h3, *(I3[i, j] for i, j in PAIRS)])
 
     def pseudo(self, pi: Any) -> Any:
         cp = self.cp
@@ -240,10 +234,12 @@ class Written:
         rows.append([pi[1], pi[2], pi[3], pi[0]])
         return cp.bmat(rows)
 
-    def disc(self, disc: Disc, m: Any, h: Any, S: Any) -> None:
-        cp = self.cp
-        least = self.M / (2.0 * np.pi * disc.density * disc.thickness * self.L**2)
-        self.constraints.append(cp.quad_over_lin(h, m) + least * cp.square(m) <= cp.trace(S))
+    def no_denser(self, m: Any, h: Any, S: Any) -> None:
+        """Flat material of density d and thickness t has at least the inertia m^2 / (2 pi d t) about its centre."""
+        cp, density = self.cp, self.case.arguments["material"]
+        if density is not None:
+            least = self.M / (2.0 * np.pi * density * self.case.arguments["thickness"] * self.L**2)
+            self.constraints.append(cp.quad_over_lin(h, m) + least * cp.square(m) <= cp.trace(S))
 
     def inside(self, b: int, m: Any, h: Any, S: Any) -> None:
         """Second moments about the centre of the region, in its axes: those of the joint."""

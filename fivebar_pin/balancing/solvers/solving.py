@@ -104,6 +104,7 @@ def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
     worst = max(
         problem.program.outside(g + G @ x) / scale,
         float(np.abs(P * x + q - G.T @ z).max(initial=0.0)) / (1.0 + float(np.abs(q).max(initial=0.0))),
+        float(np.abs(problem.program.projected(z) - z).max(initial=0.0)) / (1.0 + float(np.abs(z).max(initial=0.0))),
         abs(objective - dual) / (1.0 + abs(objective)),
     )
     if not worst <= tolerance:
