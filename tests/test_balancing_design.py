@@ -209,7 +209,7 @@ def test_no_random_feasible_design_beats_the_optimum() -> None:
 def check_certificate(design: Design) -> None:
     assert not design.feasible
     assert design.certificate is not None
-    assert design.certificate.size > 1e7
+    assert design.certificate.size > 1e5  # times the bounds on the variables
     assert np.isnan(design.parameters).all()
     with pytest.raises(InfeasibleError, match="Farkas"):
         _ = design.chain

@@ -47,8 +47,13 @@ where every f is linear (added mass, inertia reflected at the motors) or a norm 
 torque, shaking force and moment, bearing forces, deviation of the angular momentum, distance to the present design).
 It is a conic program. Its optimum is global and its dual is a lower bound that comes with the design. If there is no
 design, a vector z of the dual cone with G^T z = 0 and g.z < 0 proves it (Farkas); the proof is checked here again and
-names the conditions and bounds that contradict each other. Solutions are kept a hair inside the cones, moved onto the
-conditions exactly, and refused if a body is outside the physical ones by more than 1e-12.
+names the conditions and bounds that contradict each other. Both are rigorous: what r = P x + q - G^T z leaves over is
+charged with bounds b on the variables, sum |r_i| b_i, and these follow from the problem (masses by their bounds, ten
+moving masses where there is none; moments by the regions; see `solvers.bound`). Solutions are kept a hair inside the
+cones, moved onto the conditions exactly, and refused if a body is outside the physical ones by more than 1e-12. Where
+material has no volume to be in, points and sheets on the border of a region, the region gives way by a hair: up to
+1e-7 of the moving mass and its size squared; the bound stays that of the region as given, so the gap may be as far
+below zero. Clarabel solves (`solver="clarabel"`); SciPy (`solver="scipy"`) shares nothing with it.
 
 The objective of Alici and Shirinzadeh (2004), the sum of squares of bearing forces, torques, shaking moment and angular
 momentum deviation under the force balance equalities, is one such problem (`alici_shirinzadeh`), and so is every

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing.solvers.program import Block, svec
+from fivebar_pin.balancing.solvers import Block, svec
 
 _LIMIT = 48  # variables of one piece
 
@@ -25,7 +25,7 @@ class Cones:
 
     def __init__(self) -> None:
         self._anchor: list[float] = []
-        self._parts: list[tuple[str, str, Array, Array | None]] = []
+        self._parts: list[tuple[str, str, Array, Array | None, bool]] = []
 
     @property
     def count(self) -> int:
@@ -43,9 +43,11 @@ class Cones:
         """Return a form at the anchor."""
         return float(form[: self.count] @ np.array(self._anchor) + form[-1])
 
-    def add(self, label: str, cone: str, forms: Sequence[Array], inward: Array | None = None) -> None:
+    def add(
+        self, label: str, cone: str, forms: Sequence[Array], inward: Array | None = None, *, soft: bool = False
+    ) -> None:
         """Ask the forms to lie in a cone; without `inward` the way in is their value at the anchor."""
-        self._parts.append((label, cone, np.stack(forms), inward))
+        self._parts.append((label, cone, np.stack(forms), inward, soft))
 
     def semidefinite(self, label: str, matrix: Sequence[Sequence[Array]], inward: Array | None = None) -> None:
         """Ask a symmetric matrix of forms to be positive semidefinite."""
@@ -78,9 +80,9 @@ class Cones:
         """Return all cones on the variables of this piece."""
         n, anchor = self.count, np.array(self._anchor)
         out = []
-        for label, cone, forms, inward in self._parts:
+        for label, cone, forms, inward, soft in self._parts:
             G = forms[:, :n]
-            out.append(Block(label, cone, G, forms[:, -1], G @ anchor if inward is None else inward))
+            out.append(Block(label, cone, G, forms[:, -1], G @ anchor if inward is None else inward, soft))
         return tuple(out)
 
 

@@ -32,6 +32,7 @@ class Given:
         density: of the material [kg/m3] and its thickness in the plane [m], or None for any.
         paths, rows: the motions and the quantities along them.
         near: configuration (nq,) of the one branch that is balanced, or None.
+        solver: name of the solver.
     """
 
     chain: ClosedChain
@@ -50,3 +51,4 @@ class Given:
     paths: tuple[Trajectory, ...] = field(repr=False)
     rows: Mapping[str, Rows] = field(repr=False)
     near: Array | None
+    solver: str

@@ -7,7 +7,7 @@ In scaled parameters: lengths in chain lengths, masses in moving masses. The var
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from fivebar_pin.balancing._cones import Cones, constant
 from fivebar_pin.balancing._parameters import _PAIRS, from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.balancing.pieces import Density, Solid
 from fivebar_pin.balancing.regions import Shape
-from fivebar_pin.balancing.solvers.program import Block, svec
+from fivebar_pin.balancing.solvers import Block, svec
 
 _SPREAD = 0.3  # of the anchor's unit mass, as a share of the region (of the chain's length without one) [-]
 _TWO, _FIVE_THIRDS = 2.0, 5.0 / 3.0  # powers of the mass in the least inertia of a flat piece and of a ball
@@ -99,7 +99,7 @@ class Material:
         for block in self.own:
             G = np.zeros((block.G.shape[0], n))
             G[:, self.start : self.start + self.size] = block.G
-            out.append(Block(block.label, block.cone, G, block.g, block.inward))
+            out.append(replace(block, G=G))
         return out
 
     def pseudo_inertia(self, z: Array, height: float) -> Array:
@@ -156,7 +156,7 @@ def material(body: int, sign: int, start: int, label: str, bounds: Bounds, *, pl
     forms = _Moments(planar, bounds)
     forms.physical(label, bounds.taken_from)
     if bounds.shape is not None:
-        forms.cones.add(f"{label} stays in its region", "nonneg", forms.region(bounds.shape))
+        forms.cones.add(f"{label} stays in its region", "nonneg", forms.region(bounds.shape), soft=True)
     if bounds.solid is not None:
         forms.makeable(label, bounds.solid, bounds)
     elif bounds.density is not None:

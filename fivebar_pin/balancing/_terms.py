@@ -64,6 +64,11 @@ class Term:
             return float((G @ y + g)[0])
         return max(float(np.linalg.norm(G @ y + g, axis=1).max()) for G, g in self._stacks())
 
+    def largest(self, sizes: Array) -> float:
+        """Return a bound on |term| / scale over all |y_i| <= sizes_i (n,)."""
+        tops = (np.linalg.norm(np.abs(G) @ sizes + np.abs(g), axis=1).max() for G, g in self._stacks())
+        return max(float(top) for top in tops) / self.scale
+
     def epigraph(self, column: int) -> list[Block]:
         """Return the cones of scale * y[column] >= term, for a variable after those of the design."""
         bound = np.zeros(column + 1)

@@ -66,7 +66,8 @@ class Design:
         space: parameters that the design is written in, four per body (planar) or ten.
         conditions: the balancing conditions, or None when nothing is exact.
         objective: weighted sum of the terms.
-        dual_bound: no design within the bounds has a lower objective.
+        dual_bound: no design within the bounds has a lower objective, whatever the solver's errors (see
+            `solvers.bound`): they are charged against the bounds on the variables that follow from masses and regions.
         terms: value of every term of the objective, in its own unit.
         parameters: inertial parameters of all bodies (nb, 10); nan when infeasible.
         added, removed: material per body that may change; for a redesign, `added` holds the new bodies.

@@ -18,6 +18,7 @@ from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.pieces import Piece
 from fivebar_pin.balancing.problem import balance_problem
 from fivebar_pin.balancing.regions import Region
+from fivebar_pin.balancing.solvers import DEFAULT
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
 
@@ -45,6 +46,7 @@ def balance(
     space: SpaceName = "auto",
     seed: int = 0,
     conditions: BalanceConditions | None = None,
+    solver: str = DEFAULT,
 ) -> Design:
     """Find the globally optimal balanced design, or prove that there is none.
 
@@ -77,6 +79,8 @@ def balance(
         gravity, about, near, space, seed: as for `balance_conditions`.
         conditions: of this mechanism and kind, with the same arguments, where they were found before; a sweep over
             bounds or objectives then finds them once.
+        solver: "clarabel", or "scipy", which shares nothing with it and takes some fifty times as long. Where Clarabel
+            has no acceptable answer, SciPy is asked before giving up.
 
     Returns:
         The design; ask its `feasible`, `chain`, `certificate`. Special lengths (antiparallelograms, kites) may leave no
@@ -86,7 +90,7 @@ def balance(
         infeasible; other branches are listed as alternatives.
 
     Raises:
-        UnknownNameError: a kind, body, term or mode that does not exist.
+        UnknownNameError: a kind, body, term, mode or solver that does not exist.
         InvalidInputError: bounds that contradict themselves, bodies without influence, a mechanism that is not
             physical to begin with, terms without motions.
         SolverError: no solution to the tolerance and no proof either.
@@ -114,6 +118,7 @@ def balance(
             space=space,
             seed=seed,
             conditions=conditions,
+            solver=solver,
         )
         return problem.solve(terms)
 

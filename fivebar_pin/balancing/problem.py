@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
-from fivebar_pin.balancing import _lift
+from fivebar_pin.balancing import _empty, _extent, _lift
 from fivebar_pin.balancing._given import Given
 from fivebar_pin.balancing._making import Maker, Sizes
 from fivebar_pin.balancing._material import Material
@@ -34,17 +34,40 @@ from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, condition
 from fivebar_pin.balancing.design import Asked, Design
 from fivebar_pin.balancing.pieces import THICKNESS, Piece, density_of, positive
 from fivebar_pin.balancing.regions import Region
-from fivebar_pin.balancing.solvers import Block, Certificate, Outcome, Program, solve
+from fivebar_pin.balancing.solvers import DEFAULT, SECOND, Block, Certificate, Outcome, Program, solve, solver_named
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
 __all__ = ["BalanceProblem", "balance_problem"]
 
-_MARGINS = (1e-9, 1e-8, 1e-7, 0.0)  # how far inside the cones a design is kept, as a share of the moving mass
+_MARGINS = (1e-9, 1e-8, 1e-7, 1e-6)  # how far inside the cones a design is kept, as a share of the moving mass
+_GIVE = ((1e-9, 1e-8), (1e-8, 1e-7))  # margin, and how far regions give way where nothing else is left, the same
 _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
 _FELT = 1e-12  # factor of an inertia that counts as zero in the conditions and terms of a scaled problem [-]
 _PHYSICAL = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """One objective over a problem: a program, its cost in units, what that stands for, and who solves it."""
+
+    program: Program
+    P: Array
+    q: Array
+    unit: float
+    weights: Mapping[str, float]
+    limits: tuple[Block, ...]
+    solver: str
+
+    def solve(self, *, margin: float = 0.0, give: float = 0.0) -> Outcome:
+        """Solve; where the default solver has no acceptable answer, the other one is asked before giving up."""
+        try:
+            return solve(self.program, self.P, self.q, margin=margin, give=give, solver=self.solver)
+        except SolverError as error:
+            if self.solver != DEFAULT or np.isnan(error.residual):
+                raise
+        return solve(self.program, self.P, self.q, margin=margin, give=give, solver=SECOND)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -56,6 +79,7 @@ class BalanceProblem:
         space: the parameters of the problem.
         mode: "add" or "redesign".
         materials: pieces of material that are variables.
+        gone: for each of them, whether the conditions leave none of it.
         terms: objectives by base name.
         rows: quantities along the motions.
         limits: upper bounds, as given.
@@ -65,6 +89,7 @@ class BalanceProblem:
         limited: upper bounds on terms, part of the program.
         caps: bounds on added masses that have none of their own.
         mass: unit of mass [kg].
+        sizes: bounds on the variables (n,) that follow from those on masses and the regions.
         near: configuration (nq,) of the one branch that is balanced, or None.
         given: what the problem was made from.
         arms: parameters (nb, 10) of the arms that carry counterweights, part of the present bodies.
@@ -77,6 +102,7 @@ class BalanceProblem:
     space: Space
     mode: str
     materials: tuple[Material, ...]
+    gone: tuple[bool, ...]
     terms: dict[str, Term]
     rows: dict[str, Rows]
     limits: dict[str, npt.ArrayLike]
@@ -87,6 +113,7 @@ class BalanceProblem:
     limited: tuple[Block, ...] = field(repr=False)
     caps: tuple[Block, ...] = field(repr=False)
     mass: float
+    sizes: Array = field(repr=False)
     near: Array | None
     given: Given = field(repr=False)
     arms: Array = field(repr=False)
@@ -102,16 +129,29 @@ class BalanceProblem:
         scale = self.terms[base(objective)].scale
         return scale * scale if objective.startswith("mean_square_") else scale
 
-    def solve(self, minimise: str | Mapping[str, float], *, limits: Mapping[str, float] | None = None) -> Design:
+    def solve(
+        self,
+        minimise: str | Mapping[str, float],
+        *,
+        limits: Mapping[str, float] | None = None,
+        solver: str | None = None,
+    ) -> Design:
         """Solve for other weights, or further upper bounds, of the prepared objectives.
 
         Counterweights of a stated kind are found in steps that each give something that can be made.
 
+        Args:
+            minimise, limits: as for `balance`.
+            solver: one of `solvers.SOLVERS`; the one the problem was prepared for unless given.
+
         Raises:
-            UnknownNameError: an objective that was not prepared.
+            UnknownNameError: an objective that was not prepared, or a solver that there is not.
             SolverError: no solution to the tolerance and no proof either.
         """
         weights = weights_of(minimise, self.mode)
+        if solver is not None:
+            solver_named(solver)
+            return replace(self, given=replace(self.given, solver=solver)).solve(minimise, limits=limits)
         further = dict(limits or {})
         for name in (*weights, *further):
             if base(name) not in self.terms:
@@ -135,18 +175,44 @@ class BalanceProblem:
             block for name, top in limits.items() for block in self.terms[base(name)].bounded(positive_limit(name, top))
         ]
         bounds = [*self.program.blocks, *limited]
-        P, q, unit, epigraphs = self._objective(weights)
-        program = Program(P.size, [*bounds, *self.caps, *epigraphs])
-        problem = ""
+        P, q, unit, epigraphs, sizes = self._objective(weights)
+        program = Program(P.size, [*bounds, *self.caps, *epigraphs], sizes)
+        asked = _Task(program, P, q, unit, weights, tuple(limited), self.given.solver)
+        design = self._inside(asked)
+        if design is not None:
+            return design
+        outcome = asked.solve()
+        if outcome.x is None:
+            return self._infeasible(self._proof(bounds) or outcome.certificate)
+        design, problem = self._finish(outcome, asked)
+        return design or self._on_the_boundary(asked, problem)
+
+    def _inside(self, asked: _Task) -> Design | None:
+        """Return the design that is kept a hair inside the cones, by the least margin that makes it physical."""
         for margin in _MARGINS:
-            outcome = solve(program, P, q, margin=margin)
+            try:
+                outcome = asked.solve(margin=margin)
+            except SolverError:
+                return None  # to be tried on the boundary, where it says why if it fails again
             if outcome.x is None:
-                outcome = solve(program, P, q)
-                if outcome.x is None:
-                    return self._infeasible(self._proof(bounds) or outcome.certificate)
-            design, problem = self._finish(outcome, program, weights, (P, unit), limited)
+                return None
+            design, _ = self._finish(outcome, asked)
             if design is not None:
                 return design
+        return None
+
+    def _on_the_boundary(self, asked: _Task, problem: str) -> Design:
+        """Return a design where bodies are points or sheets on the boundary of their regions, which give way by a hair.
+
+        Raises:
+            SolverError: there is none either.
+        """
+        for margin, give in _GIVE:
+            outcome = asked.solve(margin=margin, give=give)
+            if outcome.x is not None:
+                design, problem = self._finish(outcome, asked)
+                if design is not None:
+                    return design
         raise SolverError(
             f"neither a design nor a proof that there is none: the closest one {problem}. It may exist only where "
             "bodies shrink to points, or only as a limit. Loosen the bounds or the regions."
@@ -155,12 +221,13 @@ class BalanceProblem:
     def _proof(self, bounds: Sequence[Block]) -> Certificate | None:
         """Return a proof that does without the caps on masses, which says more, if there is one."""
         try:
-            return solve(Program(self.n, bounds), np.zeros(self.n), np.zeros(self.n)).certificate
+            nothing = np.zeros(self.n)
+            return solve(Program(self.n, bounds, self.sizes), nothing, nothing, solver=self.given.solver).certificate
         except SolverError:
             return None
 
-    def _objective(self, weights: Mapping[str, float]) -> tuple[Array, Array, float, list[Block]]:
-        """Return P, q over all variables, the unit they were divided by, and the epigraphs of the terms that count.
+    def _objective(self, weights: Mapping[str, float]) -> tuple[Array, Array, float, list[Block], Array]:
+        """Return P, q over all variables, the unit they were divided by, the epigraphs of the terms that count, bounds.
 
         Every such term gets one variable after those of the material.
         """
@@ -176,19 +243,13 @@ class BalanceProblem:
                     q[column] += weight * term.scale
         unit = float(max(P.max(initial=0.0), q.max(initial=0.0))) or 1.0
         blocks = [b for k, name in enumerate(used) for b in self.terms[name].epigraph(self.n + k)]
-        return P / unit, q / unit, unit, blocks
+        sizes = np.concatenate([self.sizes, [self.terms[name].largest(self.sizes) for name in used]])
+        return P / unit, q / unit, unit, blocks, sizes
 
-    def _finish(
-        self,
-        outcome: Outcome,
-        program: Program,
-        weights: Mapping[str, float],
-        cost: tuple[Array, float],
-        limits: Sequence[Block],
-    ) -> tuple[Design | None, str]:
+    def _finish(self, outcome: Outcome, asked: _Task) -> tuple[Design | None, str]:
         """Make a solution exact and check it; None and the reason when it is not physical."""
         assert outcome.x is not None
-        x = self._compact(outcome.x[: self.n], weights, limits)
+        x = self._compact(outcome.x[: self.n], asked.weights, asked.limits)
         for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
             y, residual = self._exact(x, drop)
             parts = _lift.lift(self, y)
@@ -199,11 +260,10 @@ class BalanceProblem:
                 f"misses the conditions by {residual:.2g} ({_EXACT:g} is allowed) and its least physical body by "
                 f"{max(0.0, -parts.lowest):.2g} ({_PHYSICAL:g})"
             )
+        weights = asked.weights
         values = {name: self.terms[base(name)].measured(parts.parameters) for name in weights}
         squared = {k: v * v if k.startswith("mean_square_") else v for k, v in values.items()}
         objective = sum(weights[k] * squared[k] for k in weights)
-        P, unit = cost
-        dual = unit * (-float(program.g @ outcome.z) - 0.5 * float(outcome.x @ (P * outcome.x)))
         design = Design(
             status="optimal",
             original=self.chain,
@@ -212,7 +272,7 @@ class BalanceProblem:
             space=self.space,
             conditions=self.conditions,
             objective=objective,
-            dual_bound=dual,
+            dual_bound=asked.unit * outcome.bound,
             terms=squared,
             parameters=frozen(parts.parameters),
             added=parts.added,
@@ -250,7 +310,7 @@ class BalanceProblem:
         A = np.concatenate([B @ self.E, self.fixed[:, :-1]])
         b = np.concatenate([B @ self.X0, -self.fixed[:, -1]])
         mass = np.array([abs(float(y[m.start])) for m in self.materials])
-        share = np.where(mass < drop, 0.0, np.maximum(mass, 1e-9))
+        share = np.where((mass < drop) | np.array(self.gone), 0.0, np.maximum(mass, 1e-9))
         share = np.repeat(share, [m.size for m in self.materials])
         y = np.where(share > 0.0, y, 0.0)
         for _ in range(3 if A.size else 0):
@@ -295,12 +355,14 @@ def balance_problem(
     space: SpaceName = "auto",
     seed: int = 0,
     conditions: BalanceConditions | None = None,
+    solver: str = DEFAULT,
 ) -> BalanceProblem:
     """Prepare a balancing problem for several objectives; arguments as for `balance`."""
     if kind is not None and kind not in KINDS:
         raise UnknownNameError("kind of balance", kind, KINDS)
     if mode not in ("add", "redesign"):
         raise UnknownNameError("mode", mode, ("add", "redesign"))
+    solver_named(solver)
     check_terms(tuple(objectives), "objective")
     check_terms(dict(limits or {}), "limit")
     point = checked("about", about, (3,))
@@ -341,6 +403,7 @@ def balance_problem(
         paths=paths,
         rows=rows,
         near=None if near is None else checked("near", near, (chain.nq,)),
+        solver=solver,
     )
     return assembled(given)
 
@@ -374,6 +437,8 @@ def assembled(given: Given, sizes: Sizes | None = None, arms: Array | None = Non
     n = E.shape[1]
     maker = TermMaker(chain, setup, dict(given.rows), given.paths, E, X0, full_E, full_0)
     limited = maker.limits(given.limits)
+    blocks, caps = setup.constraints(materials, E, X0, given.masses), tuple(setup.caps(materials, given.masses, n))
+    gone = _empty.empty(blocks, materials, n)
     return BalanceProblem(
         chain=chain,
         kind=given.kind,
@@ -381,16 +446,18 @@ def assembled(given: Given, sizes: Sizes | None = None, arms: Array | None = Non
         space=space,
         mode=given.mode,
         materials=tuple(materials),
+        gone=gone,
         terms={name: maker.make(name) for name in given.objectives},
         rows=dict(given.rows),
         limits=dict(given.limits),
         E=frozen(E),
         X0=frozen(X0),
-        program=Program(n, setup.constraints(materials, E, X0, given.masses) + limited),
+        program=Program(n, _empty.without([*blocks, *limited], materials, gone, n)),
         fixed=frozen(setup.fixed(materials, given.masses, n)),
         limited=tuple(limited),
-        caps=tuple(setup.caps(materials, given.masses, n)),
+        caps=caps,
         mass=setup.mass,
+        sizes=frozen(_extent.extents(materials, gone, [*blocks, *caps], n)),
         near=given.near,
         given=given,
         arms=frozen(arms),

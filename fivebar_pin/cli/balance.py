@@ -17,6 +17,7 @@ from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 
 KINDS = ("force", "moment", "dynamic", "static")
+SOLVERS = ("clarabel", "scipy")  # as in `balancing.solvers`, without loading it
 
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -144,6 +145,7 @@ def _designing(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--thickness", type=float, help="of flat material [m] [a fifth of the mechanism's length]")
     parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
+    parser.add_argument("--solver", choices=SOLVERS, default=SOLVERS[0], help=f"of the conic program [{SOLVERS[0]}]")
     parser.add_argument(
         "--branch",
         choices=("all", "motion"),
@@ -174,6 +176,7 @@ def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, An
         "motions": [trajectory],
         "gravity": _direction(chosen),
         "near": trajectory.q[0] if chosen.branch == "motion" else None,
+        "solver": chosen.solver,
     }
 
 

@@ -9,7 +9,20 @@ A new solver is a module here with a function `answers(problem, tolerance)` and 
 from __future__ import annotations
 
 from fivebar_pin.balancing.solvers.certificate import Certificate
-from fivebar_pin.balancing.solvers.program import Block, Program, smat, svec
-from fivebar_pin.balancing.solvers.solving import DEFAULT, SOLVERS, Outcome, solve
+from fivebar_pin.balancing.solvers.cones import smat, svec
+from fivebar_pin.balancing.solvers.program import Block, Program
+from fivebar_pin.balancing.solvers.solving import DEFAULT, SECOND, SOLVERS, Outcome, solve, solver_named
 
-__all__ = ["DEFAULT", "SOLVERS", "Block", "Certificate", "Outcome", "Program", "smat", "solve", "svec"]
+__all__ = [
+    "DEFAULT",
+    "SECOND",
+    "SOLVERS",
+    "Block",
+    "Certificate",
+    "Outcome",
+    "Program",
+    "smat",
+    "solve",
+    "solver_named",
+    "svec",
+]

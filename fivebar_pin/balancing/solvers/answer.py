@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.program import Problem
 
-__all__ = ["Answer", "Solver"]
+__all__ = ["Answer", "Solver", "nothing"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +27,11 @@ class Answer:
     x: Array
     z: Array
     status: str
+
+
+def nothing(problem: Problem, status: str) -> Answer:
+    """Return the answer of a solver that has none."""
+    return Answer("solved", np.full(problem.q.size, np.nan), np.full(problem.g.size, np.nan), status)
 
 
 Solver = Callable[[Problem, float], Iterator[Answer]]  # problem, tolerance -> answers, each tried harder for

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from fivebar_pin.balancing.solvers.answer import Answer
+from fivebar_pin.balancing.solvers.answer import Answer, nothing
 from fivebar_pin.balancing.solvers.program import Block, Problem
 from fivebar_pin.errors import SolverError
 
@@ -25,6 +25,7 @@ _ATTEMPTS: tuple[dict[str, object], ...] = (
 _ITERATIONS = 300
 _ASKED = 1e-2  # the solver is asked for this much of the tolerance that is accepted
 _TOLERANCES = ("tol_gap_abs", "tol_gap_rel", "tol_feas", "tol_infeas_abs", "tol_infeas_rel")
+_PANIC = "PanicException"  # what a panic in Rust arrives as; it is no Exception and has no importable class
 _CONES = {"zero": "ZeroConeT", "nonneg": "NonnegativeConeT", "soc": "SecondOrderConeT"}
 
 
@@ -48,7 +49,13 @@ def answers(problem: Problem, tolerance: float) -> Iterator[Answer]:
             setattr(settings, name, _ASKED * tolerance)
         for name, value in changes.items():
             setattr(settings, name, value)
-        solution = clarabel.DefaultSolver(quadratic, problem.q, minus_G, problem.g, cones, settings).solve()
+        try:
+            solution = clarabel.DefaultSolver(quadratic, problem.q, minus_G, problem.g, cones, settings).solve()
+        except BaseException as error:
+            if type(error).__name__ != _PANIC:
+                raise
+            yield nothing(problem, f"gave up: {error}")
+            continue
         yield Answer(_kind(str(solution.status)), np.array(solution.x), np.array(solution.z), str(solution.status))
 
 

@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.balancing.solvers.cones import CONES, outside, projected
 
-__all__ = ["CONES", "Block", "Problem", "Program", "outside", "smat", "svec"]
-
-CONES = ("zero", "nonneg", "soc", "psd")  # in the order in which programs hold them
-ROOT2 = float(np.sqrt(2.0))
+__all__ = ["Block", "Problem", "Program"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +27,7 @@ class Block:
         G: (rows, n).
         g: (rows,).
         inward: direction into the cone (rows,): a margin subtracts this much from g.
+        soft: whether the bound may give way by a hair, where a design exists on its boundary alone.
     """
 
     label: str | tuple[str, ...]
@@ -36,6 +35,7 @@ class Block:
     G: Array
     g: Array
     inward: Array | None = None
+    soft: bool = False
 
 
 class Program:
@@ -44,12 +44,15 @@ class Program:
     Attributes:
         n: number of variables.
         blocks: in the order of `CONES`.
-        G, g, inward: of all blocks together (rows, n), (rows,), (rows,).
+        G, g, inward, soft: of all blocks together (rows, n), (rows,), (rows,), (rows,).
         slices: rows of each block.
+        sizes: every solution that matters has |x_i| <= sizes_i (n,); infinite unless stated. Bounds and proofs hold
+            within them.
     """
 
-    def __init__(self, n: int, blocks: Sequence[Block]) -> None:
+    def __init__(self, n: int, blocks: Sequence[Block], sizes: Array | None = None) -> None:
         """Put blocks together; those with fewer than n columns leave the last variables alone."""
+        self.sizes = np.full(n, np.inf) if sizes is None else sizes
         self.n = n
         self.blocks = sorted(blocks, key=lambda b: CONES.index(b.cone))
         self.G = np.zeros((sum(b.g.size for b in self.blocks), n))
@@ -57,6 +60,7 @@ class Program:
         self.inward = np.concatenate(
             [np.zeros(b.g.size) if b.inward is None else b.inward for b in self.blocks] or [np.zeros(0)]
         )
+        self.soft = np.repeat([b.soft for b in self.blocks], [b.g.size for b in self.blocks]).astype(bool)
         ends = np.cumsum([b.g.size for b in self.blocks])
         self.slices = [slice(int(e) - b.g.size, int(e)) for e, b in zip(ends, self.blocks, strict=True)]
         for block, part in zip(self.blocks, self.slices, strict=True):
@@ -65,6 +69,11 @@ class Program:
     def outside(self, s: Array) -> float:
         """Return how far s (rows,) is outside the cone."""
         return max((outside(b.cone, s[part]) for b, part in zip(self.blocks, self.slices, strict=True)), default=0.0)
+
+    def projected(self, z: Array) -> Array:
+        """Return the point of the dual cone that is closest to z (rows,)."""
+        parts = [projected(b.cone, z[part]) for b, part in zip(self.blocks, self.slices, strict=True)]
+        return np.concatenate(parts) if parts else np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,34 +91,3 @@ class Problem:
     P: Array
     q: Array
     g: Array
-
-
-def svec(rows: Sequence[Sequence[Array]]) -> Array:
-    """Stack linear functionals M_ij (n,) of a symmetric matrix into the scaled triangle of a "psd" block."""
-    size = len(rows)
-    return np.stack([rows[i][j] * (1.0 if i == j else ROOT2) for j in range(size) for i in range(j + 1)])
-
-
-def smat(s: Array) -> Array:
-    """Return the symmetric matrix of a scaled triangle."""
-    size = int(np.sqrt(2 * s.size))
-    M = np.zeros((size, size))
-    k = 0
-    for j in range(size):
-        for i in range(j + 1):
-            M[i, j] = M[j, i] = s[k] / (1.0 if i == j else ROOT2)
-            k += 1
-    return M
-
-
-def outside(cone: str, s: Array) -> float:
-    """Return how far s (rows,) is outside one cone; its dual cone is the same but for "zero"."""
-    if not s.size:
-        return 0.0
-    if cone == "zero":
-        return float(np.abs(s).max())
-    if cone == "nonneg":
-        return max(0.0, -float(s.min()))
-    if cone == "soc":
-        return max(0.0, float(np.linalg.norm(s[1:]) - s[0]))
-    return max(0.0, -float(np.linalg.eigvalsh(smat(s))[0]))

@@ -12,14 +12,16 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.answer import Answer, Solver
+from fivebar_pin.balancing.solvers.bound import lower_bound, stationary
 from fivebar_pin.balancing.solvers.certificate import Certificate, certificate_of
 from fivebar_pin.balancing.solvers.program import Problem, Program
 from fivebar_pin.errors import SolverError, UnknownNameError
 
-__all__ = ["DEFAULT", "SOLVERS", "Outcome", "solve", "solver_named"]
+__all__ = ["DEFAULT", "SECOND", "SOLVERS", "Outcome", "solve", "solver_named"]
 
-SOLVERS = ("clarabel",)  # each is the module of this name beside this one, with its function `answers`
+SOLVERS = ("clarabel", "scipy")  # each is the module of this name beside this one, with its function `answers`
 DEFAULT = "clarabel"
+SECOND = "scipy"  # asked where the default has no acceptable answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +30,8 @@ class Outcome:
 
     Attributes:
         x, z: primal (n,) and dual (rows,) solution.
-        objective, dual: values of the two problems.
+        objective, dual: values of the two problems, with the margin.
+        bound: what no objective without the margin is below, rigorously (see `bound`).
         certificate: proof of infeasibility.
     """
 
@@ -36,6 +39,7 @@ class Outcome:
     z: Array
     objective: float
     dual: float
+    bound: float
     certificate: Certificate | None
 
 
@@ -52,15 +56,22 @@ def solver_named(name: str) -> Solver:
 
 
 def solve(
-    program: Program, P: Array, q: Array, *, margin: float = 0.0, tolerance: float = 1e-8, solver: str = DEFAULT
+    program: Program,
+    P: Array,
+    q: Array,
+    *,
+    margin: float = 0.0,
+    give: float = 0.0,
+    tolerance: float = 1e-8,
+    solver: str = DEFAULT,
 ) -> Outcome:
-    """Solve for a diagonal P (n,) and q (n,), the cones tightened by a margin.
+    """Solve for a diagonal P (n,) and q (n,), the cones tightened by a margin, or soft bounds given way by `give`.
 
     Raises:
         SolverError: no solution to the tolerance and no valid certificate; a solver that is not installed.
         UnknownNameError: there is no such solver.
     """
-    problem = Problem(program, P, q, program.g - margin * program.inward)
+    problem = Problem(program, P, q, program.g - np.where(program.soft, margin - give, margin) * program.inward)
     failure = SolverError("the conic solver was not run")
     for answer in solver_named(solver)(problem, tolerance):
         try:
@@ -73,8 +84,8 @@ def solve(
 def _outcome(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
     """Check one answer, whatever the solver calls it."""
     if answer.kind == "infeasible":
-        certificate = certificate_of(problem.program, answer.z, problem.g, tolerance)
-        return Outcome(None, answer.z, float("nan"), float("nan"), certificate)
+        certificate = certificate_of(problem.program, answer.z, problem.g)
+        return Outcome(None, answer.z, float("nan"), float("nan"), float("inf"), certificate)
     if answer.kind == "unbounded":
         raise SolverError(
             "the objective can fall without bound: bound the region, the masses or choose another objective"
@@ -86,13 +97,14 @@ def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
     P, q, g, G = problem.P, problem.q, problem.g, problem.program.G
     x, z = answer.x, answer.z
     if not (np.isfinite(x).all() and np.isfinite(z).all()):
-        raise SolverError(f"the conic solver stopped without an answer ({answer.status})")
+        raise SolverError(f"the conic solver stopped without an answer ({answer.status})", residual=np.inf)
     quadratic = float(x @ (P * x))
     objective, dual = 0.5 * quadratic + float(q @ x), -float(g @ z) - 0.5 * quadratic
     scale = 1.0 + float(np.abs(x).max(initial=0.0))
     worst = max(
         problem.program.outside(g + G @ x) / scale,
         float(np.abs(P * x + q - G.T @ z).max(initial=0.0)) / (1.0 + float(np.abs(q).max(initial=0.0))),
+        float(np.abs(problem.program.projected(z) - z).max(initial=0.0)) / (1.0 + float(np.abs(z).max(initial=0.0))),
         abs(objective - dual) / (1.0 + abs(objective)),
     )
     if not worst <= tolerance:
@@ -102,4 +114,7 @@ def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
             residual=worst,
             tolerance=tolerance,
         )
-    return Outcome(x, z, objective, dual, None)
+    bound = lower_bound(problem.program, P, q, x, z)
+    if objective - bound > tolerance * (1.0 + abs(objective)):  # what stationarity leaves over is worth a correction
+        bound = max(bound, lower_bound(problem.program, P, q, x, stationary(problem.program, z, P * x + q)))
+    return Outcome(x, z, objective, dual, bound, None)
