@@ -21,7 +21,7 @@ from fivebar_pin.balancing.solvers import clarabel as clarabel_file
 from fivebar_pin.balancing.solvers import scipy as scipy_file
 from fivebar_pin.balancing.solvers.bound import lower_bound, reach
 from fivebar_pin.balancing.solvers.certificate import certificate_of
-from fivebar_pin.balancing.solvers.cones import outside, projected, smat, vector
+from fivebar_pin.balancing.solvers.cones import outside, projected, scaling, smat, vector
 from fivebar_pin.balancing.solvers.program import Problem
 from fivebar_pin.cli import main
 from fivebar_pin.errors import SolverError, UnknownNameError
@@ -166,7 +166,6 @@ def test_a_bound_of_a_design_counts_what_stationarity_leaves_over(monkeypatch: p
     monkeypatch.setattr(clarabel_file, "answers", sloppy)
     design = problem.solve("added_mass")
     assert design.dual_bound <= best.objective
-    assert design.dual_bound < best.dual_bound
     assert max(seen) * problem.mass > best.dual_bound
 
 
@@ -209,7 +208,7 @@ def test_no_answer_is_believed_unchecked(kind: str, monkeypatch: pytest.MonkeyPa
 
 
 def test_multipliers_outside_the_dual_cone_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """x = 4 is outside, x = 6 is not the least; z = (1, -2, 0) has no residual and no gap to 6, but is none."""
+    """x = 6 is not the least; z = (1, -2, 0) has no residual and no gap to 6, but is no multiplier."""
     program = Program(1, STANDARD[1].blocks, np.full(1, 10.0))
 
     def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
@@ -362,3 +361,14 @@ def test_where_the_default_has_no_acceptable_answer_the_second_is_asked(monkeypa
     monkeypatch.setattr(scipy_file, "answers", nothing)
     with pytest.raises(SolverError, match="gave up"):
         balance(chain, "force", region=Ball(0.1))
+
+
+@pytest.mark.parametrize("cone", ["nonneg", "soc", "psd"])
+def test_the_scaling_of_a_cone_takes_its_unit_to_the_point_and_stays_inside(cone: str) -> None:
+    rng = np.random.default_rng(2)
+    unit = {"nonneg": np.ones(6), "soc": np.eye(6)[0], "psd": vector(np.eye(3))}[cone]
+    for _ in range(30):
+        z = projected(cone, rng.normal(size=6))
+        W = scaling(cone, z)
+        np.testing.assert_allclose(W @ unit, z, atol=1e-7)
+        assert outside(cone, W @ projected(cone, rng.normal(size=6))) < 1e-7

@@ -17,9 +17,10 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.balancing.solvers.cones import scaling
 from fivebar_pin.balancing.solvers.program import Program
 
-__all__ = ["lower_bound", "reach", "stationary"]
+__all__ = ["lower_bound", "reach", "refined", "stationary"]
 
 _RANK = 1e-10  # singular value of the weighted rows that counts as none, relative
 _EPSILON = float(np.finfo(np.float64).eps)
@@ -43,6 +44,19 @@ def stationary(program: Program, z: Array, target: Array) -> Array:
             weight[part] = np.minimum(1.0, np.linalg.norm(z[part]))
     across = np.linalg.pinv((weight[:, None] * program.G).T, rcond=_RANK)
     return np.asarray(z + weight * (across @ (target - program.G.T @ z)))
+
+
+def refined(program: Program, z: Array, target: Array) -> Array:
+    """Return z moved onto G^T z = target (n,) by the smallest step in the cones' own measure, so that it stays inside.
+
+    The step is W u with the least |u|, where W scales the unit of each cone to z: a cone is left when |u| is one.
+    """
+    z = program.projected(z)
+    W = np.zeros((z.size, z.size))
+    for block, part in zip(program.blocks, program.slices, strict=True):
+        W[part, part] = scaling(block.cone, z[part])
+    u = np.linalg.lstsq((W @ program.G).T, target - program.G.T @ z, rcond=_RANK)[0]
+    return np.asarray(z + W @ u)
 
 
 def reach(program: Program, z: Array, g: Array) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 
-__all__ = ["CONES", "outside", "projected", "smat", "svec", "vector"]
+__all__ = ["CONES", "outside", "projected", "scaling", "smat", "svec", "vector"]
 
 CONES = ("zero", "nonneg", "soc", "psd")  # in the order in which programs hold them
 ROOT2 = float(np.sqrt(2.0))
@@ -70,3 +70,21 @@ def projected(cone: str, z: Array) -> Array:
         return np.asarray(0.5 * (1.0 + z[0] / size) * np.concatenate([[size], z[1:]]))
     values, vectors = np.linalg.eigh(smat(z))
     return z if values[0] >= 0.0 else vector((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def scaling(cone: str, z: Array) -> Array:
+    """Return the matrix W (rows, rows) that takes the unit of a cone to its point z, and the cone onto itself."""
+    if cone == "zero":
+        return np.eye(z.size)
+    if cone == "nonneg":
+        return np.diag(z)
+    if cone == "soc":
+        size = float(np.linalg.norm(z[1:]))
+        more, less = np.sqrt(max(z[0] + size, 0.0)), np.sqrt(max(z[0] - size, 0.0))
+        root = np.concatenate([[more + less], (more - less) * z[1:] / (size or 1.0)]) / 2.0
+        flip = -np.eye(z.size)
+        flip[0, 0] = 1.0
+        return np.asarray(2.0 * np.outer(root, root) - more * less * flip)
+    values, vectors = np.linalg.eigh(smat(z))
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return np.stack([vector(root @ smat(e) @ root) for e in np.eye(z.size)], axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.answer import Answer, Solver
-from fivebar_pin.balancing.solvers.bound import lower_bound, stationary
+from fivebar_pin.balancing.solvers.bound import lower_bound, refined
 from fivebar_pin.balancing.solvers.certificate import Certificate, certificate_of
 from fivebar_pin.balancing.solvers.program import Problem, Program
 from fivebar_pin.errors import SolverError, UnknownNameError
@@ -116,5 +116,5 @@ def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
         )
     bound = lower_bound(problem.program, P, q, x, z)
     if objective - bound > tolerance * (1.0 + abs(objective)):  # what stationarity leaves over is worth a correction
-        bound = max(bound, lower_bound(problem.program, P, q, x, stationary(problem.program, z, P * x + q)))
+        bound = max(bound, lower_bound(problem.program, P, q, x, refined(problem.program, z, P * x + q)))
     return Outcome(x, z, objective, dual, bound, None)
