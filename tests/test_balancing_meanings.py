@@ -123,7 +123,7 @@ def test_what_is_promised_is_what_the_designed_bodies_do(name: str, term: str, m
     assert design.feasible
     before = measured(chain, inverse_dynamics(chain, path, about=ABOUT))[term]
     assert design.terms[term] <= before * (1.0 + 1e-9)
-    assert abs(design.gap) < 1e-6 * before
+    assert abs(design.gap) < 1e-5 * before  # what a design leaves open and still calls itself optimal
     check(design, path, (term,))
 
 

@@ -42,6 +42,7 @@ __all__ = ["BalanceProblem", "balance_problem"]
 
 _MARGINS = (1e-9, 1e-8, 1e-7, 1e-6)  # how far inside the cones a design is kept, as a share of the moving mass
 _GIVE = ((1e-9, 1e-8), (1e-8, 1e-7))  # margin, and how far regions give way where nothing else is left, the same
+_PROVED = 1e-5  # gap at which a design counts as optimal; a wider one is for the second solver [of its typical size]
 _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
 _FELT = 1e-12  # factor of an inertia that counts as zero in the conditions and terms of a scaled problem [-]
@@ -180,12 +181,22 @@ class BalanceProblem:
         asked = _Task(program, P, q, unit, weights, tuple(limited), self.given.solver)
         design = self._inside(asked)
         if design is not None:
-            return design
+            return self._closer(design, asked)
         outcome = asked.solve()
         if outcome.x is None:
             return self._infeasible(self._proof(bounds) or outcome.certificate)
         design, problem = self._finish(outcome, asked)
         return design or self._on_the_boundary(asked, problem)
+
+    def _closer(self, design: Design, asked: _Task) -> Design:
+        """Return the better of two solvers' designs, with the better bound, where the first leaves a gap."""
+        size = max(abs(design.objective), asked.unit)
+        if design.gap > _PROVED * size and asked.solver != SECOND:
+            other = self._inside(replace(asked, solver=SECOND))
+            if other is not None:
+                below = max(design.dual_bound, other.dual_bound)
+                design = replace(min(design, other, key=lambda d: d.objective), dual_bound=below)
+        return design if design.gap <= _PROVED * size else replace(design, status="feasible")
 
     def _inside(self, asked: _Task) -> Design | None:
         """Return the design that is kept a hair inside the cones, by the least margin that makes it physical."""
