@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import numpy.typing as npt
 
@@ -29,7 +31,7 @@ def numeric(name: str, values: npt.ArrayLike) -> Array:
     """
     try:
         return frozen(values)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(name, values, f"must be an array of numbers ({error})") from error
 
 
@@ -66,6 +68,13 @@ def number(name: str, value: object, *, positive: bool = False, unit: str = "") 
     if not np.isfinite(x):
         raise InvalidInputError(name, x, f"must be finite{tail}")
     return x
+
+
+def table_text(header: str, body: Array) -> str:
+    """Return a table (n, k) as csv text below a header line, every digit kept."""
+    text = io.StringIO()
+    np.savetxt(text, body, delimiter=",", header=header, comments="", fmt="%.17g")
+    return text.getvalue()
 
 
 def skew(x: Array) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fivebar_pin._arrays import figures, settled
+from fivebar_pin._files import check_folder, check_new, write_file, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
@@ -75,7 +76,7 @@ def run_balance(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import balance
     from fivebar_pin.cli._load import load_any
 
-    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite) if chosen.out else None
+    folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
     chain = load_any(chosen.path)
     trajectory = moved(chain, chosen.motion)
     minimise = {name: 1.0 if value is None else value for name, value in _pairs("--minimise", chosen.minimise)}
@@ -90,10 +91,11 @@ def run_balance(chosen: argparse.Namespace) -> int:
         return 1
     after = _realised(console, design, chosen)
     pair = _moving(design, after, trajectory)
-    _print_design(console, design, after, pair)
+    files: tuple[Path, ...] = ()
     if folder is not None:
-        for file in _write(folder, design, after, trajectory, pair, overwrite=chosen.overwrite):
-            console.print(f"  {file}", markup=False)
+        files = write_set(folder, _files(folder, design, after, trajectory, pair), overwrite=chosen.overwrite)
+    _print_design(console, design, after, pair)
+    _tables.written(console, files)
     if chosen.view:
         from fivebar_pin import viz
 
@@ -106,17 +108,19 @@ def run_pareto(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import pareto
     from fivebar_pin.cli._load import load_any
 
+    out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
     chain = load_any(chosen.path)
     options = _options(chosen, moved(chain, chosen.motion))
     console = _tables.console()
     with console.status("tracing the front"):
         front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)
+    if out is not None:
+        columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]
+        write_file(out, _output.columns_text(columns), overwrite=False)
     pair = (chosen.first, chosen.second)
     rows = [[figures(d.terms[name], d.scale(name), digits=6) for name in pair] for d in front.designs]
     _tables.table(console, f"{chain.name}: {chosen.kind} balance", (chosen.first, chosen.second), rows)
-    if chosen.out:
-        columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]
-        console.print(f"  {_output.write_columns(_output.fresh_file(Path(chosen.out)), columns)}", markup=False)
+    _tables.written(console, () if out is None else (out,))
     return 0
 
 
@@ -292,17 +296,18 @@ def _moving(design: Any, after: ClosedChain, trajectory: Trajectory) -> list[Any
     return [Shown(chain, trajectory, inverse_dynamics(chain, trajectory), label) for label, chain in both.items()]
 
 
-def _write(
-    folder: Path, design: Any, after: ClosedChain, trajectory: Trajectory, pair: list[Any], *, overwrite: bool
-) -> list[Path]:
-    from fivebar_pin import io, viz
+def _files(
+    folder: Path, design: Any, after: ClosedChain, trajectory: Trajectory, pair: list[Any]
+) -> dict[str, str | bytes]:
+    from fivebar_pin import viz
+    from fivebar_pin.io._save import texts
 
-    files = list(io.save(after, folder, name=f"{design.original.name}_balanced", overwrite=overwrite))
     columns = _output.motion_columns(design.original, trajectory)
     for one in pair:
         columns += [(f"{one.label} {name}", x) for name, x in _output.load_columns(one.chain, one.loads)]
-    files.append(_output.write_columns(folder / "results.csv", columns))
-    made: Any = _output.load_figures({one.label: one.loads for one in pair}, trajectory.t)
-    files += viz.plots.save(made, folder, overwrite=overwrite)
-    files.append(viz.html(folder / "animation.html", pair, title=_title(design), overwrite=overwrite))
-    return files
+    return {
+        **texts(after, folder, name=f"{design.original.name}_balanced"),
+        "results.csv": _output.columns_text(columns),
+        **viz.plots.png(_output.load_figures({one.label: one.loads for one in pair}, trajectory.t)),
+        "animation.html": viz.page(pair, title=_title(design)),
+    }

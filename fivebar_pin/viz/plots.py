@@ -7,6 +7,7 @@ global state of pyplot alone.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -16,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, figures, settled
-from fivebar_pin.errors import InvalidInputError, OutputError
+from fivebar_pin._files import write_set
+from fivebar_pin.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from fivebar_pin.dynamics import Loads
     from fivebar_pin.motion import Motion
 
-__all__ = ["com", "forces", "frame", "motion", "save", "shaking", "torques"]
+__all__ = ["com", "forces", "frame", "motion", "png", "save", "shaking", "torques"]
 
 _T = TypeVar("_T")
 
@@ -173,7 +175,7 @@ def save(figures: Mapping[str, Figure], folder: str | Path, *, overwrite: bool =
     Args:
         figures: figures by file name, without ending.
         folder: where they go.
-        overwrite: whether existing files may be replaced; if not, nothing at all is written when one exists.
+        overwrite: whether existing files may be replaced; all are written or, after an error, none.
         dpi: dots per inch.
 
     Returns:
@@ -182,20 +184,25 @@ def save(figures: Mapping[str, Figure], folder: str | Path, *, overwrite: bool =
     Raises:
         OutputError: a file exists, or cannot be written.
     """
+    return list(write_set(folder, png(figures, dpi=dpi), overwrite=overwrite))
+
+
+def png(figures: Mapping[str, Figure], *, dpi: int = 130) -> dict[str, bytes]:
+    """Return each figure as the content of a PNG file, by file name.
+
+    Args:
+        figures: figures by file name, without ending.
+        dpi: dots per inch.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    paths = [Path(folder) / f"{name}.png" for name in figures]
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise OutputError(path, "exists already; choose another folder or allow overwriting")
-    for path, figure in zip(paths, figures.values(), strict=True):
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            FigureCanvasAgg(figure)
-            figure.savefig(path, dpi=dpi)
-        except OSError as error:
-            raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
-    return paths
+    out = {}
+    for name, figure in figures.items():
+        FigureCanvasAgg(figure)
+        content = io.BytesIO()
+        figure.savefig(content, dpi=dpi, format="png")
+        out[f"{name}.png"] = content.getvalue()
+    return out
 
 
 def _over_time(
