@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 
 import numpy as np
 import numpy.typing as npt
@@ -68,6 +69,30 @@ def number(name: str, value: object, *, positive: bool = False, unit: str = "") 
     if not np.isfinite(x):
         raise InvalidInputError(name, x, f"must be finite{tail}")
     return x
+
+
+def integer(name: str, value: object, *, least: int = 0, most: int | None = None) -> int:
+    """Return a whole number within bounds.
+
+    Raises:
+        InvalidInputError: not an integer, less than `least`, or more than `most`.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
+    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
+        bound = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise InvalidInputError(name, value, f"must be an integer {bound}")
+    return int(value)  # type: ignore[call-overload,no-any-return]
+
+
+def require_memory(name: str, value: object, needed: float) -> None:
+    """Refuse what needs more memory [bytes] than the machine has, which would stop everything else on it first."""
+    try:
+        there = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):  # a system that does not tell
+        return
+    if needed > there:
+        rule = f"needs {needed / 1e9:.3g} GB of memory where this machine has {there / 1e9:.3g} GB"
+        raise InvalidInputError(name, value, rule, "Ask for less.")
 
 
 def table_text(header: str, body: Array) -> str:

@@ -8,6 +8,7 @@ global state of pyplot alone.
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, figures, settled
+from fivebar_pin._arrays import Array, checked, figures, integer, settled
 from fivebar_pin._files import write_set
 from fivebar_pin.errors import InvalidInputError
 
@@ -33,6 +34,9 @@ _T = TypeVar("_T")
 
 _VISIBLE = 1e-9
 """Share of the largest component below which another one cannot be seen [-]."""
+_MOST_DPI = 1000
+"""More makes pictures larger than can be drawn [dots per inch]."""
+
 _STYLES = (
     ("#D55E00", "-", 2.0),
     ("#0072B2", "--", 2.0),
@@ -196,6 +200,7 @@ def png(figures: Mapping[str, Figure], *, dpi: int = 130) -> dict[str, bytes]:
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+    integer("dpi", dpi, least=1, most=_MOST_DPI)
     out = {}
     for name, figure in figures.items():
         FigureCanvasAgg(figure)
@@ -235,10 +240,18 @@ def _show_round_off(ax: Axes, curves: Sequence[Array], scale: float) -> None:
         ax.set_ylim(-1.0, 1.0)
 
 
-def _sheet(rows: int, columns: int, title: str, *, height: float) -> tuple[Figure, list[Axes]]:
-    from matplotlib.figure import Figure
+def _figure_class() -> type[Figure]:
+    """Return matplotlib's figure; it looks at the environment when it is imported, though no window is needed here."""
+    try:
+        from matplotlib.figure import Figure
+    except ValueError as error:
+        name = os.environ.get("MPLBACKEND", "")
+        raise InvalidInputError("MPLBACKEND", name, f"matplotlib refuses it ({error})", "Unset it.") from error
+    return Figure
 
-    figure = Figure(figsize=(7.5 if columns == 1 else 10.0, height), layout="constrained")
+
+def _sheet(rows: int, columns: int, title: str, *, height: float) -> tuple[Figure, list[Axes]]:
+    figure = _figure_class()(figsize=(7.5 if columns == 1 else 10.0, height), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.suptitle(title, fontweight="bold")
     axes = list(grid.flat)
