@@ -12,6 +12,7 @@ from fivebar_pin._arrays import Array, figures, table_text
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _tables
 from fivebar_pin.dynamics import Loads
+from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
@@ -19,8 +20,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+MOST_SAMPLES = 1_000_000
+"""Samples above which no command computes: they would not fit into the memory of most machines."""
+
+
 def columns_text(columns: list[tuple[str, Array]]) -> str:
     """Return named columns as csv, every digit kept."""
+    for name, values in columns:
+        if not np.isfinite(values).all():
+            hint = "The numbers given are beyond what can be computed."
+            raise InvalidInputError(name, float("nan"), "must be finite", hint)
     return table_text(",".join(name for name, _ in columns), np.column_stack([x for _, x in columns]))
 
 

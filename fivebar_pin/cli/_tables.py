@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,19 @@ def console() -> Console:
     """Return the console that tables go to; it prints names as they are, whatever brackets and colons they hold."""
     from rich.console import Console
 
-    return Console(highlight=False, soft_wrap=False, markup=False, emoji=False)
+    class Terminal(Console):
+        def on_broken_pipe(self) -> None:
+            """Leave it to `main`, which knows what it means that the reader has gone."""
+            raise BrokenPipeError
+
+    return Terminal(highlight=False, soft_wrap=False, markup=False, emoji=False)
+
+
+def progress() -> Console:
+    """Return the console that tells of work under way: the error stream, which leaves the results alone."""
+    from rich.console import Console
+
+    return Console(stderr=True, quiet=not sys.stderr.isatty())
 
 
 def table(console: Console, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -44,6 +57,12 @@ def written(console: Console, files: Sequence[Path]) -> None:
     """Tell which files have been written."""
     for file in files:
         console.print(f"  {file}", soft_wrap=True)
+
+
+def announce(text: str) -> None:
+    """Print at once, before anything that waits."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
 def peak(x: Array) -> float:

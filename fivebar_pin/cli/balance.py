@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fivebar_pin._arrays import figures, settled
+from fivebar_pin._arrays import figures, integer, settled
 from fivebar_pin._files import check_folder, check_new, write_file, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
@@ -16,6 +16,8 @@ from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
+
+_MOST_POINTS = 10_000  # designs on a front; each is a problem to solve
 
 KINDS = ("force", "moment", "dynamic", "static")
 SOLVERS = ("clarabel", "scipy")  # as in `balancing.solvers`, without loading it
@@ -82,7 +84,7 @@ def run_balance(chosen: argparse.Namespace) -> int:
     minimise = {name: 1.0 if value is None else value for name, value in _pairs("--minimise", chosen.minimise)}
     limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
     console = _tables.console()
-    with console.status("balancing"):
+    with _tables.progress().status("balancing"):
         options = _options(chosen, trajectory)
         piece = _piece(chosen, chain)
         design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, counterweight=piece, **options)
@@ -99,7 +101,7 @@ def run_balance(chosen: argparse.Namespace) -> int:
     if chosen.view:
         from fivebar_pin import viz
 
-        viz.view(pair, title=_title(design))
+        viz.view(pair, title=_title(design), announce=_tables.announce)
     return 0
 
 
@@ -108,11 +110,12 @@ def run_pareto(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import pareto
     from fivebar_pin.cli._load import load_any
 
+    integer("--points", chosen.points, least=2, most=_MOST_POINTS)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
     chain = load_any(chosen.path)
     options = _options(chosen, moved(chain, chosen.motion))
     console = _tables.console()
-    with console.status("tracing the front"):
+    with _tables.progress().status("tracing the front"):
         front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)
     if out is not None:
         columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fivebar_pin import motion as laws
-from fivebar_pin._arrays import Array, figures, number
+from fivebar_pin._arrays import Array, figures, integer, number
 from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
@@ -77,10 +77,11 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin import paper, viz
 
     number("speed", chosen.speed, positive=True)
+    integer("--samples", chosen.samples, least=2, most=_output.MOST_SAMPLES)
     mode = paper.AssemblyMode[chosen.mode.upper()]
     motion = (
         laws.from_file(chosen.motion)
-        if chosen.motion
+        if chosen.motion is not None
         else paper.default_motion(samples=chosen.samples, period=chosen.period)
     )
     unbalanced = paper.table_1(chosen.case, "unbalanced")
@@ -98,8 +99,7 @@ def run(chosen: argparse.Namespace) -> int:
     console.print("Written:")
     _tables.written(console, files)
     if chosen.view:
-        console.print("Opening the live view; Ctrl-C ends it.")
-        viz.view(_shown(runs), speed=chosen.speed, title=_title(chosen.case))
+        viz.view(_shown(runs), speed=chosen.speed, title=_title(chosen.case), announce=_tables.announce)
     return 0
 
 

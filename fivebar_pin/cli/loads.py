@@ -41,7 +41,7 @@ def run(chosen: argparse.Namespace) -> int:
     loads = inverse_dynamics(chain, trajectory, about=chosen.about)
     files: tuple[Path, ...] = ()
     if folder is not None:
-        motion = laws.from_file(chosen.motion) if chosen.motion else None
+        motion = laws.from_file(chosen.motion) if chosen.motion is not None else None
         files = write_set(folder, _files(chain, trajectory, loads, motion), overwrite=chosen.overwrite)
     console = _tables.console()
     _print(console, chain, trajectory, loads)

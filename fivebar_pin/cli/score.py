@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, figures
+from fivebar_pin._arrays import Array, figures, integer
 from fivebar_pin._files import as_path, check_new, read_bounded, write_file
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
@@ -60,11 +60,10 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import variations
     from fivebar_pin.cli._load import load_any
 
-    if chosen.best < 1:
-        raise InvalidInputError("--best", chosen.best, "must be at least 1")
+    integer("--best", chosen.best, least=1)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
     chain = load_any(chosen.path)
-    if chosen.designs:
+    if chosen.designs is not None:
         designs = _read(as_path(chosen.designs), chain)
     else:
         designs = variations(chain, chosen.random, spread=chosen.spread, seed=chosen.seed)
@@ -98,13 +97,12 @@ def _read(file: Path, chain: ClosedChain) -> Array:
 
 def _scored(chain: ClosedChain, trajectory: Trajectory, designs: Array, terms: tuple[str, ...]) -> Scores:
     """Score behind a progress bar on the error stream, which leaves the results alone."""
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from fivebar_pin.balancing import score
 
     columns = (TextColumn("scoring"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=_tables.progress(), transient=True) as bar:
         task = bar.add_task("scoring", total=None)
         return score(
             chain,
