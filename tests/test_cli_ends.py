@@ -188,7 +188,16 @@ def test_files_are_written_before_anything_is_printed(tmp_path: Path, monkeypatc
 
     for words in (
         ["loads", "four_bar_crank_rocker", "--out", str(tmp_path / "loads")],
-        ["balance", "four_bar_crank_rocker", "--radius", "0.1", "--out", str(tmp_path / "balance")],
+        [
+            "balance",
+            "four_bar_crank_rocker",
+            "--radius",
+            "0.1",
+            "--realise",
+            "disc",
+            "--out",
+            str(tmp_path / "balance"),
+        ],
         ["simulate", "slider_crank", "--time", "0.01", "--out", str(tmp_path / "simulate")],
         [*DEMO, "--out", str(tmp_path / "demo")],
     ):

@@ -75,7 +75,7 @@ def run_conditions(chosen: argparse.Namespace) -> int:
 
 def run_balance(chosen: argparse.Namespace) -> int:
     """Balance, print, write."""
-    from fivebar_pin.balancing import balance
+    from fivebar_pin.balancing import balance, realise
     from fivebar_pin.cli._load import load_any
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
@@ -91,11 +91,14 @@ def run_balance(chosen: argparse.Namespace) -> int:
     if not design.feasible:
         console.print(repr(design), markup=False, soft_wrap=True)
         return 1
-    after = _realised(console, design, chosen)
+    made = realise(design) if chosen.realise else None
+    after = design.chain if made is None else made.chain
     pair = _moving(design, after, trajectory)
     files: tuple[Path, ...] = ()
     if folder is not None:
         files = write_set(folder, _files(folder, design, after, trajectory, pair), overwrite=chosen.overwrite)
+    if made is not None:
+        _print_realised(console, made)
     _print_design(console, design, after, pair)
     _tables.written(console, files)
     if chosen.view:
@@ -236,20 +239,13 @@ def _balance(design: Any) -> str:
     return f"{design.kind} balance" + ("" if design.branch is None else " on the branch of the motion")
 
 
-def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedChain:
-    """Return the designed mechanism; made of counterweights, promised beside realised, when they are asked for."""
-    if not chosen.realise:
-        chain: ClosedChain = design.chain
-        return chain
-    from fivebar_pin.balancing import realise
-
-    made = realise(design)
+def _print_realised(console: Any, made: Any) -> None:
+    """Print the counterweights that were asked for, promised beside realised."""
     for weight in made.weights:
         console.print(f"  {weight}", markup=False, soft_wrap=True)
     rows = [[name, *words] for name, words in made.figures.items()]
     _tables.table(console, "Counterweights", ("", "promised", "realised"), rows)
     console.print(f"{made.claim}", markup=False, soft_wrap=True)
-    return made.chain
 
 
 def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]) -> None:
