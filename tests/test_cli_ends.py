@@ -105,6 +105,8 @@ def test_errors_are_one_line_whatever_they_repeat(capsys: pytest.CaptureFixture[
         said = capsys.readouterr().err
         assert said.count("\n") == 1 and said.startswith("fivebar-pin check: ") and len(said) < 2100
         assert said.rstrip("\n").isprintable()
+    assert main(["check", "x\ny.urdf"]) == 1
+    assert "x y.urdf: there is no such file" in capsys.readouterr().err
     with pytest.raises(SystemExit) as ended:
         main(["demo", "--samples", "9" * 20_000])
     assert ended.value.code == 2 and len(capsys.readouterr().err.splitlines()[-1]) < 2100

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -318,6 +319,24 @@ def test_pipes_and_devices_are_refused_and_never_waited_for(tmp_path: Path) -> N
     for path in (tmp_path / ("n" * 300), tmp_path / "none.csv", Path("/proc/self/mem")):
         with pytest.raises(FileFormatError, match="cannot be read"):
             read_bounded(path)
+
+
+def test_no_read_waits_for_a_file_that_only_seems_to_be_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some files of the system do; here a pipe that takes the place of a file after it was looked at."""
+
+    def late(*_: object) -> None:
+        raise AssertionError("waits")
+
+    os.mkfifo(tmp_path / "pipe.csv")
+    monkeypatch.setattr(Path, "is_file", lambda _: True)
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(10)
+    try:
+        with pytest.raises(FileFormatError, match="is empty"):
+            read_bounded(tmp_path / "pipe.csv")
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def test_new_files_need_their_folder_and_a_free_name(tmp_path: Path) -> None:
