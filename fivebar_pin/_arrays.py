@@ -79,8 +79,10 @@ def integer(name: str, value: object, *, least: int = 0, most: int | None = None
     """
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
     if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
-        bound = f"of at least {least}" if most is None else f"from {least} to {most}"
-        raise InvalidInputError(name, value, f"must be an integer {bound}")
+        bound = (
+            f" from {least} to {most}" if most is not None else f" of at least {least}" if least else ", not negative"
+        )
+        raise InvalidInputError(name, value, f"must be an integer{bound}")
     return int(value)  # type: ignore[call-overload,no-any-return]
 
 

@@ -10,9 +10,12 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fivebar_pin.cli import _command, main
+from fivebar_pin.cli._output import columns_text
+from fivebar_pin.errors import InvalidInputError
 
 PROGRAM = [sys.executable, "-m", "fivebar_pin"]
 CHECK = ["check", "four_bar_crank_rocker"]
@@ -146,9 +149,13 @@ def test_results_beyond_the_range_of_numbers_are_not_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """No warnings between the lines, and no table of nan."""
-    assert main(["loads", "slider_crank", "--gravity", "0", "1e308", "0", "--out", str(tmp_path / "o")]) == 1
+    (tmp_path / "fast.csv").write_text("t,q_x,v_x,a_x\n0,1,1e200,0\n1,1,1e200,0\n")
+    words = ["loads", "four_bar_crank_rocker", "--motion", str(tmp_path / "fast.csv"), "--out", str(tmp_path / "o")]
+    assert main(words) == 1
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and not (tmp_path / "o").exists()
+    with pytest.raises(InvalidInputError, match="x = nan but must be finite"):
+        columns_text([("t", np.zeros(1)), ("x", np.array([np.inf]))])
 
 
 @pytest.mark.parametrize(
