@@ -50,7 +50,7 @@ def main():
     proof = len(whole.certificate.conflict)
     print(f"\nwith the moment as well: {whole.status}; the proof combines {proof} conditions and bounds")
     if not headless:
-        viz.view(shown, speed=SPEED, title="Case I: what balance costs")
+        viz.view(shown, speed=SPEED, title="Case I: what balance costs", announce=print)
 
 
 if __name__ == "__main__":

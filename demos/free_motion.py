@@ -61,7 +61,7 @@ def main():
         print(f"t = {instant:4.1f} s: tip {tip}, {np.abs(tip - published).max():.1e} m from the published position")
     print(f"closure {trajectory.worst_closure:.1e} m, energy drift {energy_balance(chain, trajectory).drift():.1e}")
     if not headless:
-        viz.view([viz.Shown(chain, trajectory)], title="Double four-bar, free motion")
+        viz.view([viz.Shown(chain, trajectory)], title="Double four-bar, free motion", announce=print)
 
 
 if __name__ == "__main__":

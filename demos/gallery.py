@@ -40,7 +40,7 @@ def main():
         loads = fb.inverse_dynamics(chain, trajectory)
         print(f"    {loads}; open by {trajectory.worst_closure:.1e}, power residual {loads.power_residual():.1e}")
         if not headless:
-            viz.view([viz.Shown(chain, trajectory, loads)], title=name)
+            viz.view([viz.Shown(chain, trajectory, loads)], title=name, announce=print)
 
 
 if __name__ == "__main__":

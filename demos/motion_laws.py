@@ -48,7 +48,7 @@ def main():
         )
         shown.append(viz.Shown(chain, trajectory, loads, name))
     if not headless:
-        viz.view(shown, speed=0.5, title="One turn, four motion laws")
+        viz.view(shown, speed=0.5, title="One turn, four motion laws", announce=print)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def main():
             everything.append(moved(linkage, motion, label))
             report(everything[-1])
     if not headless:
-        viz.view(everything, speed=SPEED, title="The paper's two cases")
+        viz.view(everything, speed=SPEED, title="The paper's two cases", announce=print)
 
 
 if __name__ == "__main__":

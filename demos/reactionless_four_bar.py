@@ -66,7 +66,7 @@ def main():
     for one in shown:
         print(f"{one.label:15s} mass centre travels {one.loads.peak('travel'):.4g} m in the view")
     if not headless:
-        viz.view(shown, speed=0.5, title="Reactionless four-bar: before and after")
+        viz.view(shown, speed=0.5, title="Reactionless four-bar: before and after", announce=print)
 
 
 if __name__ == "__main__":

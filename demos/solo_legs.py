@@ -45,7 +45,7 @@ def main():
         print(f"  power residual {loads.power_residual():.1e}")
         shown.append(viz.Shown(chain, trajectory, loads))
     if not headless:
-        viz.view(shown, speed=0.5, title="Solo, feet joined")
+        viz.view(shown, speed=0.5, title="Solo, feet joined", announce=print)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ def main():
         "both columns u spans the same space as N, column by column."
     )
     if not headless:
-        viz.view(shown, speed=0.5, title="Both cases, both assembly modes")
+        viz.view(shown, speed=0.5, title="Both cases, both assembly modes", announce=print)
 
 
 if __name__ == "__main__":

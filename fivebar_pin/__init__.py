@@ -7,30 +7,30 @@
     loads = fb.inverse_dynamics(chain, trajectory)      # torque, shaking force and moment, reactions
     design = fb.balance(chain, "force")                 # the optimal mass distribution, or the proof of none
 
-Sub-packages: `fb.paper` (the planar five-bar in closed form), `fb.balancing`, `fb.io`, `fb.viz`. What describes a
-mechanism is imported at once; everything else when it is first used, so that importing stays cheap.
+Sub-packages: `fb.paper` (the planar five-bar in closed form), `fb.balancing`, `fb.io`, `fb.viz`. Each is
+imported when it is first used, so that importing stays cheap and an interrupted command line can say so.
 """
 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
 
-from fivebar_pin import motion
-from fivebar_pin.chain import ClosedChain, Visual
-from fivebar_pin.closures import Closure, ClosureKind
-from fivebar_pin.errors import FiveBarPinError
-from fivebar_pin.motion import Motion
-from fivebar_pin.trajectory import Trajectory
-
+TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from fivebar_pin import balancing, io, paper, viz
+    from typing import Any
+
+    from fivebar_pin import balancing, io, motion, paper, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
+    from fivebar_pin.chain import ClosedChain, Visual
+    from fivebar_pin.closures import Closure, ClosureKind
     from fivebar_pin.diagnosis import Diagnosis, diagnose
     from fivebar_pin.dynamics import Loads, inverse_dynamics
+    from fivebar_pin.errors import FiveBarPinError
     from fivebar_pin.io import load, save
     from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
+    from fivebar_pin.motion import Motion
     from fivebar_pin.simulation import JointSpring, Spring, energy_balance, forward_dynamics, simulate
+    from fivebar_pin.trajectory import Trajectory
 
 __all__ = [
     "BalanceConditions",
@@ -71,12 +71,17 @@ __all__ = [
 
 _LATE = {
     "balancing": ("BalanceConditions", "Design", "balance", "balance_conditions", "pareto", "score"),
+    "chain": ("ClosedChain", "Visual"),
+    "closures": ("Closure", "ClosureKind"),
     "diagnosis": ("Diagnosis", "diagnose"),
     "dynamics": ("Loads", "inverse_dynamics"),
+    "errors": ("FiveBarPinError",),
     "io": ("load", "save"),
     "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive"),
+    "motion": ("Motion",),
     "paper": (),
     "simulation": ("JointSpring", "Spring", "energy_balance", "forward_dynamics", "simulate"),
+    "trajectory": ("Trajectory",),
     "viz": (),
 }
 

@@ -1,5 +1,5 @@
 """`python -m fivebar_pin` is the command line."""
 
-from fivebar_pin.cli import main
+from fivebar_pin.cli import script
 
-raise SystemExit(main())
+script()

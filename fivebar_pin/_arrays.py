@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import os
+
 import numpy as np
 import numpy.typing as npt
 
@@ -29,7 +32,7 @@ def numeric(name: str, values: npt.ArrayLike) -> Array:
     """
     try:
         return frozen(values)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(name, values, f"must be an array of numbers ({error})") from error
 
 
@@ -66,6 +69,39 @@ def number(name: str, value: object, *, positive: bool = False, unit: str = "") 
     if not np.isfinite(x):
         raise InvalidInputError(name, x, f"must be finite{tail}")
     return x
+
+
+def integer(name: str, value: object, *, least: int = 0, most: int | None = None) -> int:
+    """Return a whole number within bounds.
+
+    Raises:
+        InvalidInputError: not an integer, less than `least`, or more than `most`.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
+    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
+        bound = (
+            f" from {least} to {most}" if most is not None else f" of at least {least}" if least else ", not negative"
+        )
+        raise InvalidInputError(name, value, f"must be an integer{bound}")
+    return int(value)  # type: ignore[call-overload,no-any-return]
+
+
+def require_memory(name: str, value: object, needed: float) -> None:
+    """Refuse what needs more memory [bytes] than the machine has, which would stop everything else on it first."""
+    try:
+        there = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):  # a system that does not tell
+        return
+    if needed > there:
+        rule = f"needs {needed / 1e9:.3g} GB of memory where this machine has {there / 1e9:.3g} GB"
+        raise InvalidInputError(name, value, rule, "Ask for less.")
+
+
+def table_text(header: str, body: Array) -> str:
+    """Return a table (n, k) as csv text below a header line, every digit kept."""
+    text = io.StringIO()
+    np.savetxt(text, body, delimiter=",", header=header, comments="", fmt="%.17g")
+    return text.getvalue()
 
 
 def skew(x: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _mobility, _plausible
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, checked, frozen, integer
 from fivebar_pin._diagnosis import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._mobility import Site
@@ -46,6 +46,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     """
     loops = loops_of(chain)
     findings: list[Finding] = []
+    integer("seed", seed)
     start, gap = _start(chain, q, seed, findings)
     here = _mobility.site_at(loops, start)
     generic = _mobility.generic_site(chain, here, seed, _REACHED) if _is_closed(loops, start) else here

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from itertools import islice
 
 __all__ = [
     "AssemblyError",
@@ -19,8 +20,19 @@ __all__ = [
 ]
 
 
+_MOST_CHARACTERS = 2000
+"""Length of a message above which its middle is left out: it has to be read on a terminal."""
+_MOST_OF_A_VALUE = 400
+"""Characters of a value that a message repeats; the error itself holds the whole value."""
+_MOST_NAMES = 40
+"""Names that a message lists."""
+
+
 class FiveBarPinError(Exception):
-    """Base of all errors raised on purpose by this library."""
+    """Base of all errors raised on purpose by this library. No message is longer than a terminal can show."""
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*(_cut(x, _MOST_CHARACTERS) if isinstance(x, str) else x for x in args))
 
 
 class InvalidInputError(FiveBarPinError, ValueError):
@@ -34,7 +46,7 @@ class InvalidInputError(FiveBarPinError, ValueError):
 
     def __init__(self, name: str, value: object, bound: str, hint: str = "") -> None:
         self.name, self.value, self.bound = name, value, bound
-        super().__init__(f"{name} = {value!r} but {bound}." + (f" {hint}" if hint else ""))
+        super().__init__(f"{name} = {_written(value)} but {bound}." + (f" {hint}" if hint else ""))
 
 
 class UnknownNameError(FiveBarPinError, LookupError):
@@ -50,8 +62,7 @@ class UnknownNameError(FiveBarPinError, LookupError):
         self.kind, self.name, self.known = kind, name, tuple(known)
         close = difflib.get_close_matches(str(name), self.known, n=1)
         meant = f" Did you mean {close[0]!r}?" if close else ""
-        listed = ", ".join(self.known) if self.known else "(none)"
-        super().__init__(f"Unknown {kind} {name!r}; known: {listed}.{meant}")
+        super().__init__(f"Unknown {kind} {_written(name)}; known: {_listed(self.known)}.{meant}")
 
 
 class AssemblyError(FiveBarPinError):
@@ -134,3 +145,25 @@ class OutputError(FiveBarPinError):
     def __init__(self, path: object, problem: str) -> None:
         self.path = str(path)
         super().__init__(f"{path}: {problem}")
+
+
+def _written(value: object) -> str:
+    """Return how a value is written, on one line and no longer than somebody would read."""
+    try:
+        text = repr(value)
+    except Exception:  # an integer of too many digits, a stranger's object: the error that carries it must be told
+        text = f"({type(value).__name__} that cannot be written)"
+    return _cut(" ".join(text.split()) if "\n" in text else text, _MOST_OF_A_VALUE)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    shown = ", ".join(_cut(str(name), _MOST_OF_A_VALUE) for name in islice(names, _MOST_NAMES))
+    more = f" ... and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return (shown or "(none)") + more
+
+
+def _cut(text: str, most: int) -> str:
+    """Return a text with its middle left out where it is too long; what to do stands at the end."""
+    if len(text) <= most:
+        return text
+    return f"{text[: most // 2]} ... ({len(text) - most} more characters) ... {text[len(text) - most // 2 :]}"

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, numeric
+from fivebar_pin._arrays import Array, checked, integer, numeric
 from fivebar_pin._loops import Loops, PassiveMap, loops_of, open_message
 from fivebar_pin._newton import closed_enough, polish, residual_of, search
 from fivebar_pin._tracking import SINGULAR, follow, node_at, track
@@ -63,6 +63,8 @@ def assemble(
     """
     loops = loops_of(chain)
     loops.require_determined()
+    integer("starts", starts, least=1)
+    integer("seed", seed)
     x = numeric("q_actuated", q_actuated)
     if x.ndim == 2:
         each = [assemble(chain, row, near, starts=starts, seed=seed, tolerance=tolerance) for row in x]
@@ -96,6 +98,8 @@ def assembly_modes(
     """
     loops = loops_of(chain)
     loops.require_determined()
+    integer("starts", starts, least=1)
+    integer("seed", seed)
     x = checked("q_actuated", q_actuated, (chain.na,))
     q, _ = _closed_from_starts(chain, loops, x, starts, seed, tolerance)
     modes: list[Array] = []

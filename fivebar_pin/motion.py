@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, number, numeric
-from fivebar_pin.errors import FileFormatError, InvalidInputError, OutputError
+from fivebar_pin._arrays import Array, checked, number, numeric, table_text
+from fivebar_pin._files import as_path, check_new, read_bounded, write_file
+from fivebar_pin.errors import FileFormatError, InvalidInputError
 
 __all__ = [
     "Motion",
@@ -22,6 +23,9 @@ __all__ = [
     "spline",
     "to_file",
 ]
+
+_MAX_TABLE_BYTES = 256 * 1024 * 1024
+"""Size above which a table is not read [bytes]: some million samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,12 +177,13 @@ def from_file(path: str | Path) -> Motion:
     The part after q_, v_, a_ is free but must agree; the order is that of the q columns.
     """
     import csv
+    import io
 
-    file = Path(path)
+    file = as_path(path)
     try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
-            lines = [line for line in csv.reader(stream) if line]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        text = read_bounded(file, _MAX_TABLE_BYTES, may_be_empty=True).decode("utf-8-sig")
+        lines = [line for line in csv.reader(io.StringIO(text, newline="")) if line]
+    except (UnicodeDecodeError, csv.Error) as error:
         raise FileFormatError(file, f"cannot be read as a motion table ({error})") from error
     names = [name.strip() for name in lines[0]] if lines else []
     columns = [name[2:] for name in names if name.startswith("q_")]
@@ -210,14 +215,10 @@ def to_file(motion: Motion, path: str | Path, names: tuple[str, ...], *, overwri
         raise InvalidInputError("names", names, f"must be {motion.na} different names")
     if any(mark in name for name in names for mark in ',"\r\n'):
         raise InvalidInputError("names", names, "must hold no comma, quote or line break")
-    if Path(path).exists() and not overwrite:
-        raise OutputError(path, "exists already; choose another name or allow overwriting")
+    check_new(path, overwrite=overwrite)
     header = ",".join(["t", *(f"{x}_{n}" for x in "qva" for n in names)])
     body = np.column_stack([motion.t, motion.q, motion.v, motion.a])
-    try:
-        np.savetxt(path, body, delimiter=",", header=header, comments="", fmt="%.17g", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
+    write_file(path, table_text(header, body), overwrite=overwrite)
 
 
 def _numbers(file: Path, line: int, cells: list[str], width: int) -> list[float]:

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked
+from fivebar_pin._arrays import Array, checked, integer
 from fivebar_pin._energy import EnergyBalance, energy_balance
 from fivebar_pin._integration import run
 from fivebar_pin._manifold import Point
@@ -131,6 +131,7 @@ def simulate(
     for name, value in (("rtol", rtol), ("atol", atol)):
         if not 0.0 < value < 1.0:
             raise InvalidInputError(name, value, "must lie between 0 and 1")
+    integer("max_steps", max_steps, least=1)
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
     system = System.of(chain, tuple(springs))

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen, skew
+from fivebar_pin._arrays import Array, checked, frozen, integer, skew
 from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
@@ -156,8 +156,8 @@ def balance_conditions(
     if kind not in KINDS:
         raise UnknownNameError("kind of balance", kind, KINDS)
     count = max(200, 20 * len(chain.joints)) if samples is None else samples
-    if not isinstance(count, (int, np.integer)) or count < 10:
-        raise InvalidInputError("samples", samples, "must be an integer of at least 10")
+    integer("samples", count, least=10)
+    integer("seed", seed)
     point = checked("about", about, (3,))
     direction = _direction(chain, gravity) if kind == "static" else None
     drawn = random_samples(chain, int(count), near=near, seed=seed)

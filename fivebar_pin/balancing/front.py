@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, figures, frozen
+from fivebar_pin._arrays import Array, figures, frozen, integer
 from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._terms import check_terms
 from fivebar_pin.balancing.design import Design
@@ -78,8 +78,7 @@ def pareto(
     check_terms((first, second), "objective")
     if first == second:
         raise InvalidInputError("objectives", (first, second), "must differ")
-    if not isinstance(n, (int, np.integer)) or n < 2:
-        raise InvalidInputError("n", n, "must be an integer of at least 2")
+    integer("n", n, least=2)
     problem = balance_problem(chain, kind, objectives=(first, second), **options)
     left, right = _end(problem, first, second), _end(problem, second, first)
     low, high = left.terms[first], right.terms[first]

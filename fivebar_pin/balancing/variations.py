@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, frozen, integer, number, require_memory
 from fivebar_pin.balancing._parameters import from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
@@ -19,6 +19,7 @@ from fivebar_pin.errors import InvalidInputError
 __all__ = ["variations"]
 
 _BLOCK = 50_000  # designs at a time
+_COPIES = 4  # of all designs that drawing, freezing and scoring them may hold at once
 
 
 def variations(chain: ClosedChain, count: int, *, spread: float = 0.2, seed: int = 0) -> Array:
@@ -30,12 +31,11 @@ def variations(chain: ClosedChain, count: int, *, spread: float = 0.2, seed: int
         spread: typical relative change s, between 0 and 0.9 [-].
         seed: of the draw.
     """
-    if not isinstance(count, (int, np.integer)) or count < 1:
-        raise InvalidInputError("count", count, "must be an integer of at least 1")
-    if not 0.0 <= spread <= 0.9:
+    integer("count", count, least=1)
+    if not 0.0 <= number("spread", spread) <= 0.9:
         raise InvalidInputError("spread", spread, "must lie between 0 and 0.9")
-    if not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InvalidInputError("seed", seed, "must be an integer, not negative")
+    integer("seed", seed)
+    require_memory("count", count, _COPIES * count * chain.inertial_parameters.nbytes)
     rng = np.random.default_rng(seed)
     own = np.array(chain.inertial_parameters)
     P = pseudo_inertia(own)  # (nb, 4, 4)

@@ -1,19 +1,23 @@
 """The command line: parses, calls the library, prints.
 
 Exit codes: 0 done; 1 something is wrong with the input or the mechanism (one line says what); 2 the command line
-itself is wrong; 130 interrupted.
+itself is wrong; 130 interrupted. A reader of the output that leaves early (`| head`) ends the command quietly with 0.
+
+Nothing is imported here but what Python has at hand: whatever takes time has to be inside `script`, which answers
+interrupts.
 """
 
 from __future__ import annotations
 
-import argparse
+import os
 import sys
-from collections.abc import Sequence
-from importlib.metadata import version
 
-from fivebar_pin.errors import FiveBarPinError
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import NoReturn
 
-__all__ = ["main"]
+__all__ = ["main", "script"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,31 +26,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: the words after the program's name; those of the process unless given.
     """
-    parser = _parser()
-    chosen = parser.parse_args(arguments)
+    from fivebar_pin.cli import _command
+
+    return _command.main(arguments)
+
+
+def script() -> NoReturn:
+    """Be the process of the command line: `main`, and one line at an interrupt, at whatever moment it comes."""
     try:
-        return int(chosen.run(chosen))
-    except FiveBarPinError as error:
-        sys.stderr.write(f"fivebar-pin {chosen.command}: {error}\n")
-        return 1
-    except KeyboardInterrupt:
+        code = main()
+    except KeyboardInterrupt:  # while the command was being imported, or the first interrupt told
         sys.stderr.write("interrupted\n")
-        return 130
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    from fivebar_pin.cli import balance, check, demo, loads, score, simulate, view
-
-    parser = argparse.ArgumentParser(
-        prog="fivebar-pin",
-        description="Closed-chain mechanisms on Pinocchio: check them, look at them, balance them.",
-        epilog="Exit codes: 0 done, 1 something is wrong with the input or the mechanism, 2 wrong command line.",
-    )
-    parser.add_argument("--version", action="version", version=f"fivebar-pin {version('fivebar-pin')}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (demo, check, loads, simulate, balance, score, view):
-        module.register(commands)
-    return parser
+        code = 130
+    if code == 130:  # at once: what is left to do could be interrupted again, and Python might answer by a signal
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)

@@ -4,43 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, figures
+from fivebar_pin._arrays import Array, figures, table_text
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _tables
 from fivebar_pin.dynamics import Loads
-from fivebar_pin.errors import OutputError
+from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
-
-def prepared_folder(folder: Path, *, overwrite: bool) -> Path:
-    """Make the folder; refuse one that holds results already."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".writable"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise OutputError(folder, f"cannot be written ({error.strerror or error}); choose another --out") from error
-    there = sorted(path.name for path in folder.iterdir())
-    if there and not overwrite:
-        raise OutputError(folder, f"is not empty (holds {there[0]}); choose another --out, or pass --overwrite")
-    return folder
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-def write_columns(file: Path, columns: list[tuple[str, Array]]) -> Path:
-    """Write named columns as csv, every digit kept."""
-    header = ",".join(name for name, _ in columns)
-    table = np.column_stack([x for _, x in columns])
-    try:
-        np.savetxt(file, table, delimiter=",", header=header, comments="", fmt="%.17g", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(file, f"cannot be written ({error.strerror or error})") from error
-    return file
+MOST_SAMPLES = 1_000_000
+"""Samples above which no command computes: they would not fit into the memory of most machines."""
+
+
+def columns_text(columns: list[tuple[str, Array]]) -> str:
+    """Return named columns as csv, every digit kept."""
+    for name, values in columns:
+        if not np.isfinite(values).all():
+            hint = "The numbers given are beyond what can be computed."
+            raise InvalidInputError(name, float("nan"), "must be finite", hint)
+    return table_text(",".join(name for name, _ in columns), np.column_stack([x for _, x in columns]))
 
 
 def motion_columns(chain: ClosedChain, trajectory: Trajectory) -> list[tuple[str, Array]]:
@@ -125,7 +115,7 @@ def joint_unit(chain: ClosedChain, name: str) -> str:
     return "m" if joint.shortname().startswith("JointModelP") else "rad"
 
 
-def all_figures(chain: ClosedChain, trajectory: Trajectory, loads: Loads, motion: Motion | None) -> dict[str, object]:
+def all_figures(chain: ClosedChain, trajectory: Trajectory, loads: Loads, motion: Motion | None) -> dict[str, Figure]:
     """Return the plots of one mechanism by file name."""
     from fivebar_pin.viz import plots
 
@@ -135,23 +125,14 @@ def all_figures(chain: ClosedChain, trajectory: Trajectory, loads: Loads, motion
     return made
 
 
-def load_figures(loads: Mapping[str, Loads], t: Array) -> dict[str, object]:
+def load_figures(loads: Mapping[str, Loads], t: Array) -> dict[str, Figure]:
     """Return the plots of the loads of mechanisms, one over the other, by file name."""
     from fivebar_pin.viz import plots
 
-    made: dict[str, object] = {"shaking": plots.shaking(loads, t=t), "mass_centre": plots.com(loads)}
+    made: dict[str, Figure] = {"shaking": plots.shaking(loads, t=t), "mass_centre": plots.com(loads)}
     if any(one.loaded for one in loads.values()):
         made["frame"] = plots.frame(loads, t=t)
     actuated = next(iter(loads.values())).chain.actuated
     if actuated:
         made["torques"] = plots.torques(loads, actuated, t=t)
     return made
-
-
-def fresh_file(file: Path) -> Path:
-    """Return the path of a file that is to be written; refuse one that exists."""
-    if file.exists():
-        raise OutputError(file, "exists already; choose another --out")
-    if not file.parent.is_dir():
-        raise OutputError(file, "lies in a folder that does not exist; make it first")
-    return file

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from fivebar_pin._arrays import figures, settled
+from fivebar_pin._arrays import figures, integer, settled
+from fivebar_pin._files import check_folder, check_new, write_file, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
+
+_MOST_POINTS = 10_000  # designs on a front; each is a problem to solve
 
 KINDS = ("force", "moment", "dynamic", "static")
 SOLVERS = ("clarabel", "scipy")  # as in `balancing.solvers`, without loading it
@@ -72,32 +75,36 @@ def run_conditions(chosen: argparse.Namespace) -> int:
 
 def run_balance(chosen: argparse.Namespace) -> int:
     """Balance, print, write."""
-    from fivebar_pin.balancing import balance
+    from fivebar_pin.balancing import balance, realise
     from fivebar_pin.cli._load import load_any
 
-    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite) if chosen.out else None
+    folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
     chain = load_any(chosen.path)
     trajectory = moved(chain, chosen.motion)
     minimise = {name: 1.0 if value is None else value for name, value in _pairs("--minimise", chosen.minimise)}
     limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
     console = _tables.console()
-    with console.status("balancing"):
+    with _tables.progress().status("balancing"):
         options = _options(chosen, trajectory)
         piece = _piece(chosen, chain)
         design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, counterweight=piece, **options)
     if not design.feasible:
         console.print(repr(design), markup=False, soft_wrap=True)
         return 1
-    after = _realised(console, design, chosen)
+    made = realise(design) if chosen.realise else None
+    after = design.chain if made is None else made.chain
     pair = _moving(design, after, trajectory)
-    _print_design(console, design, after, pair)
+    files: tuple[Path, ...] = ()
     if folder is not None:
-        for file in _write(folder, design, after, trajectory, pair, overwrite=chosen.overwrite):
-            console.print(f"  {file}", markup=False)
+        files = write_set(folder, _files(folder, design, after, trajectory, pair), overwrite=chosen.overwrite)
+    if made is not None:
+        _print_realised(console, made)
+    _print_design(console, design, after, pair)
+    _tables.written(console, files)
     if chosen.view:
         from fivebar_pin import viz
 
-        viz.view(pair, title=_title(design))
+        viz.view(pair, title=_title(design), announce=_tables.announce)
     return 0
 
 
@@ -106,17 +113,20 @@ def run_pareto(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import pareto
     from fivebar_pin.cli._load import load_any
 
+    integer("--points", chosen.points, least=2, most=_MOST_POINTS)
+    out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
     chain = load_any(chosen.path)
     options = _options(chosen, moved(chain, chosen.motion))
     console = _tables.console()
-    with console.status("tracing the front"):
+    with _tables.progress().status("tracing the front"):
         front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)
+    if out is not None:
+        columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]
+        write_file(out, _output.columns_text(columns), overwrite=False)
     pair = (chosen.first, chosen.second)
     rows = [[figures(d.terms[name], d.scale(name), digits=6) for name in pair] for d in front.designs]
     _tables.table(console, f"{chain.name}: {chosen.kind} balance", (chosen.first, chosen.second), rows)
-    if chosen.out:
-        columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]
-        console.print(f"  {_output.write_columns(_output.fresh_file(Path(chosen.out)), columns)}", markup=False)
+    _tables.written(console, () if out is None else (out,))
     return 0
 
 
@@ -229,20 +239,13 @@ def _balance(design: Any) -> str:
     return f"{design.kind} balance" + ("" if design.branch is None else " on the branch of the motion")
 
 
-def _realised(console: Any, design: Any, chosen: argparse.Namespace) -> ClosedChain:
-    """Return the designed mechanism; made of counterweights, promised beside realised, when they are asked for."""
-    if not chosen.realise:
-        chain: ClosedChain = design.chain
-        return chain
-    from fivebar_pin.balancing import realise
-
-    made = realise(design)
+def _print_realised(console: Any, made: Any) -> None:
+    """Print the counterweights that were asked for, promised beside realised."""
     for weight in made.weights:
         console.print(f"  {weight}", markup=False, soft_wrap=True)
     rows = [[name, *words] for name, words in made.figures.items()]
     _tables.table(console, "Counterweights", ("", "promised", "realised"), rows)
     console.print(f"{made.claim}", markup=False, soft_wrap=True)
-    return made.chain
 
 
 def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]) -> None:
@@ -292,17 +295,18 @@ def _moving(design: Any, after: ClosedChain, trajectory: Trajectory) -> list[Any
     return [Shown(chain, trajectory, inverse_dynamics(chain, trajectory), label) for label, chain in both.items()]
 
 
-def _write(
-    folder: Path, design: Any, after: ClosedChain, trajectory: Trajectory, pair: list[Any], *, overwrite: bool
-) -> list[Path]:
-    from fivebar_pin import io, viz
+def _files(
+    folder: Path, design: Any, after: ClosedChain, trajectory: Trajectory, pair: list[Any]
+) -> dict[str, str | bytes]:
+    from fivebar_pin import viz
+    from fivebar_pin.io._save import texts
 
-    files = list(io.save(after, folder, name=f"{design.original.name}_balanced", overwrite=overwrite))
     columns = _output.motion_columns(design.original, trajectory)
     for one in pair:
         columns += [(f"{one.label} {name}", x) for name, x in _output.load_columns(one.chain, one.loads)]
-    files.append(_output.write_columns(folder / "results.csv", columns))
-    made: Any = _output.load_figures({one.label: one.loads for one in pair}, trajectory.t)
-    files += viz.plots.save(made, folder, overwrite=overwrite)
-    files.append(viz.html(folder / "animation.html", pair, title=_title(design), overwrite=overwrite))
-    return files
+    return {
+        **texts(after, folder, name=f"{design.original.name}_balanced"),
+        "results.csv": _output.columns_text(columns),
+        **viz.plots.png(_output.load_figures({one.label: one.loads for one in pair}, trajectory.t)),
+        "animation.html": viz.page(pair, title=_title(design)),
+    }

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fivebar_pin import motion as laws
-from fivebar_pin._arrays import Array, figures, number
+from fivebar_pin._arrays import Array, figures, integer, number
+from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.dynamics import Loads, inverse_dynamics
@@ -76,10 +77,11 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin import paper, viz
 
     number("speed", chosen.speed, positive=True)
+    integer("--samples", chosen.samples, least=2, most=_output.MOST_SAMPLES)
     mode = paper.AssemblyMode[chosen.mode.upper()]
     motion = (
         laws.from_file(chosen.motion)
-        if chosen.motion
+        if chosen.motion is not None
         else paper.default_motion(samples=chosen.samples, period=chosen.period)
     )
     unbalanced = paper.table_1(chosen.case, "unbalanced")
@@ -88,18 +90,16 @@ def run(chosen: argparse.Namespace) -> int:
         _moved(label, linkage, motion, mode, chosen.gravity)
         for label, linkage in (("unbalanced", unbalanced), ("balanced", optimum.linkage))
     ]
-    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite)
+    folder = check_folder(chosen.out, overwrite=chosen.overwrite)
+    files = write_set(folder, _files(folder, runs, motion, chosen), overwrite=chosen.overwrite)
     console = _tables.console()
     _print_balance(console, chosen.case, unbalanced, optimum)
     _print_comparison(console, runs)
     _print_checks(console, runs, optimum)
-    files = _write(folder, runs, motion, chosen)
     console.print("Written:")
-    for file in files:
-        console.print(f"  {file}")
+    _tables.written(console, files)
     if chosen.view:
-        console.print("Opening the live view; Ctrl-C ends it.")
-        viz.view(_shown(runs), speed=chosen.speed, title=_title(chosen.case))
+        viz.view(_shown(runs), speed=chosen.speed, title=_title(chosen.case), announce=_tables.announce)
     return 0
 
 
@@ -177,18 +177,16 @@ def _shown(runs: list[_Run]) -> list[Any]:
     return [Shown(r.chain, r.trajectory, r.loads, r.label) for r in runs]
 
 
-def _write(folder: Path, runs: list[_Run], motion: Motion, chosen: argparse.Namespace) -> list[Path]:
-    from fivebar_pin import io, viz
+def _files(folder: Path, runs: list[_Run], motion: Motion, chosen: argparse.Namespace) -> dict[str, str | bytes]:
+    from fivebar_pin import viz
+    from fivebar_pin.io._save import texts
 
-    files: list[Path] = []
+    files: dict[str, str | bytes] = {}
     for r in runs:
-        files += io.save(r.chain, folder, name=f"five_bar_{r.label}", formats=("urdf",), overwrite=chosen.overwrite)
-    files.append(_write_table(folder / "results.csv", runs, motion))
-    files += viz.plots.save(_figures(runs, motion), folder, overwrite=chosen.overwrite)
-    page = folder / "animation.html"
-    files.append(
-        viz.html(page, _shown(runs), speed=chosen.speed, title=_title(chosen.case), overwrite=chosen.overwrite)
-    )
+        files.update(texts(r.chain, folder, name=f"five_bar_{r.label}", formats=("urdf",)))
+    files["results.csv"] = _table(runs, motion)
+    files.update(viz.plots.png(_figures(runs, motion)))
+    files["animation.html"] = viz.page(_shown(runs), speed=chosen.speed, title=_title(chosen.case))
     return files
 
 
@@ -204,8 +202,8 @@ def _figures(runs: list[_Run], motion: Motion) -> dict[str, Any]:
     }
 
 
-def _write_table(file: Path, runs: list[_Run], motion: Motion) -> Path:
-    """Write every curve as one table with named columns and units."""
+def _table(runs: list[_Run], motion: Motion) -> str:
+    """Return every curve in one table with named columns and units."""
     columns: list[tuple[str, Array]] = [("t [s]", motion.t)]
     for k, name in enumerate(("psi", "gamma")):
         columns += [(f"{name} [rad]", motion.q[:, k]), (f"d{name} [rad/s]", motion.v[:, k])]
@@ -222,4 +220,4 @@ def _write_table(file: Path, runs: list[_Run], motion: Motion) -> Path:
         columns.append((f"{r.label} frame M_O1 [N m]", r.loads.frame_moment[:, 2]))
         for name, values in vectors.items():
             columns += [(f"{r.label} {name.format(axis)}", values[:, k]) for k, axis in enumerate("xy")]
-    return _output.write_columns(file, columns)
+    return _output.columns_text(columns)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fivebar_pin import motion as laws
 from fivebar_pin._arrays import figures
+from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
@@ -32,18 +33,19 @@ def run(chosen: argparse.Namespace) -> int:
     """Move the mechanism and print what it takes."""
     from fivebar_pin.cli._load import load_any
 
-    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite) if chosen.out else None
+    folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
     chain = load_any(chosen.path)
     if chosen.gravity:
         chain = chain.with_gravity(chosen.gravity)
     trajectory = moved(chain, chosen.motion)
     loads = inverse_dynamics(chain, trajectory, about=chosen.about)
+    files: tuple[Path, ...] = ()
+    if folder is not None:
+        motion = laws.from_file(chosen.motion) if chosen.motion is not None else None
+        files = write_set(folder, _files(chain, trajectory, loads, motion), overwrite=chosen.overwrite)
     console = _tables.console()
     _print(console, chain, trajectory, loads)
-    if folder is not None:
-        motion = laws.from_file(chosen.motion) if chosen.motion else None
-        for file in _write(folder, chain, trajectory, loads, motion, overwrite=chosen.overwrite):
-            console.print(f"  {file}", markup=False)
+    _tables.written(console, files)
     return 0
 
 
@@ -60,20 +62,14 @@ def _print(console: object, chain: ClosedChain, trajectory: Trajectory, loads: L
     _tables.table(console, "Checks", ("", ""), rows)  # type: ignore[arg-type]
 
 
-def _write(
-    folder: Path,
-    chain: ClosedChain,
-    trajectory: Trajectory,
-    loads: Loads,
-    motion: laws.Motion | None,
-    *,
-    overwrite: bool,
-) -> list[Path]:
+def _files(
+    chain: ClosedChain, trajectory: Trajectory, loads: Loads, motion: laws.Motion | None
+) -> dict[str, str | bytes]:
     from fivebar_pin import viz
 
     columns = _output.motion_columns(chain, trajectory) + _output.load_columns(chain, loads)
-    files = [_output.write_columns(folder / "loads.csv", columns)]
-    files += viz.plots.save(_output.all_figures(chain, trajectory, loads, motion), folder, overwrite=overwrite)  # type: ignore[arg-type]
-    shown = [viz.Shown(chain, trajectory, loads)]
-    files.append(viz.html(folder / "animation.html", shown, title=chain.name, overwrite=overwrite))
-    return files
+    return {
+        "loads.csv": _output.columns_text(columns),
+        **viz.plots.png(_output.all_figures(chain, trajectory, loads, motion)),
+        "animation.html": viz.page([viz.Shown(chain, trajectory, loads)], title=chain.name),
+    }

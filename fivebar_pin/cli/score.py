@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import io
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, figures
+from fivebar_pin._arrays import Array, figures, integer
+from fivebar_pin._files import as_path, check_new, read_bounded, write_file
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._moving import moved
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 TERMS = ("rms_shaking_force", "rms_shaking_moment", "rms_torque")
 FILES = (".npy", ".csv")
+_MAX_DESIGN_BYTES = 4 * 1024 * 1024 * 1024
+"""Size above which a file of designs is not read [bytes]: ten million designs of five bodies."""
 
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -56,19 +60,19 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import variations
     from fivebar_pin.cli._load import load_any
 
-    if chosen.best < 1:
-        raise InvalidInputError("--best", chosen.best, "must be at least 1")
-    out = _output.fresh_file(Path(chosen.out)) if chosen.out else None
+    integer("--best", chosen.best, least=1)
+    out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
     chain = load_any(chosen.path)
-    if chosen.designs:
-        designs = _read(Path(chosen.designs), chain)
+    if chosen.designs is not None:
+        designs = _read(as_path(chosen.designs), chain)
     else:
         designs = variations(chain, chosen.random, spread=chosen.spread, seed=chosen.seed)
     scores = _scored(chain, moved(chain, chosen.motion), designs, tuple(chosen.terms))
-    _print(chain, scores, tuple(chosen.terms), chosen.best)
     if out is not None:
         columns = [("design [-]", np.arange(len(scores), dtype=np.float64)), *scores.values.items()]
-        _tables.console().print(f"  {_output.write_columns(out, columns)}", markup=False)
+        write_file(out, _output.columns_text(columns), overwrite=False)
+    _print(chain, scores, tuple(chosen.terms), chosen.best)
+    _tables.written(_tables.console(), () if out is None else (out,))
     return 0
 
 
@@ -77,13 +81,14 @@ def _read(file: Path, chain: ClosedChain) -> Array:
     nb = len(chain.joints)
     if file.suffix not in FILES:
         raise InvalidInputError("--designs", str(file), f"must end in {' or '.join(FILES)}")
+    content = read_bounded(file, _MAX_DESIGN_BYTES)
     try:
         if file.suffix == ".npy":
-            return np.asarray(np.load(file, allow_pickle=False), dtype=np.float64)
-        with file.open(encoding="utf-8") as lines:
-            heading = any(c.isalpha() and c not in "eE" for c in lines.readline())
-        table = np.loadtxt(file, delimiter=",", skiprows=int(heading), ndmin=2)
-    except (OSError, ValueError) as error:
+            return np.asarray(np.load(io.BytesIO(content), allow_pickle=False), dtype=np.float64)
+        lines = content.decode("utf-8-sig").splitlines()
+        heading = any(c.isalpha() and c not in "eE" for c in lines[0])
+        table = np.loadtxt(lines, delimiter=",", skiprows=int(heading), ndmin=2)
+    except (TypeError, ValueError, EOFError, MemoryError) as error:
         raise FileFormatError(file, f"cannot be read as designs ({error})") from error
     if table.shape[1] != 10 * nb:
         raise FileFormatError(file, f"has {table.shape[1]} columns, {10 * nb} are needed: ten for each of {nb} bodies")
@@ -92,13 +97,12 @@ def _read(file: Path, chain: ClosedChain) -> Array:
 
 def _scored(chain: ClosedChain, trajectory: Trajectory, designs: Array, terms: tuple[str, ...]) -> Scores:
     """Score behind a progress bar on the error stream, which leaves the results alone."""
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from fivebar_pin.balancing import score
 
     columns = (TextColumn("scoring"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=_tables.progress(), transient=True) as bar:
         task = bar.add_task("scoring", total=None)
         return score(
             chain,

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fivebar_pin._arrays import figures
+from fivebar_pin._arrays import figures, integer
+from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.simulation import energy_balance, simulate
+
+_LONGEST = 1e9  # time to simulate [s]; a progress bar cannot even show more
 
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -34,22 +37,26 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin.cli._load import load_any
     from fivebar_pin.cli._moving import standing
 
-    if not (np.isfinite(chosen.time) and chosen.time > 0.0):
-        raise InvalidInputError("--time", chosen.time, "must be positive and finite [s]")
-    if chosen.samples < 2:
-        raise InvalidInputError("--samples", chosen.samples, "must be at least 2")
-    folder = _output.prepared_folder(Path(chosen.out), overwrite=chosen.overwrite) if chosen.out else None
+    if not 0.0 < chosen.time <= _LONGEST:
+        raise InvalidInputError("--time", chosen.time, f"must be positive and finite, {_LONGEST:g} at most [s]")
+    integer("--samples", chosen.samples, least=2, most=_output.MOST_SAMPLES)
+    folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
     chain = load_any(chosen.path)
     if chosen.gravity:
         chain = chain.with_gravity(chosen.gravity)
     q0, t = standing(chain), np.linspace(0.0, chosen.time, chosen.samples)
     console = _tables.console()
-    with Progress(console=console, transient=True) as bar:
+    with Progress(console=_tables.progress(), transient=True) as bar:
         task = bar.add_task("integrating", total=1.0)
         trajectory = simulate(
             chain, q0, np.zeros(chain.nv), chosen.torque, t, progress=lambda x: bar.update(task, completed=x)
         )
     balance = energy_balance(chain, trajectory, torque=chosen.torque)
+    files: tuple[Path, ...] = ()
+    if folder is not None:
+        motion = _output.columns_text(_output.motion_columns(chain, trajectory))
+        page = viz.page([viz.Shown(chain, trajectory)])
+        files = write_set(folder, {"motion.csv": motion, "animation.html": page}, overwrite=chosen.overwrite)
     rows = [
         ["closure residual [m or rad]", figures(trajectory.worst_closure)],
         ["fastest joint [rad/s or m/s]", figures(float(np.abs(trajectory.v).max()))],
@@ -57,9 +64,5 @@ def run(chosen: argparse.Namespace) -> int:
         ["supplied power against rate of energy, relative", figures(balance.residual())],
     ]
     _tables.table(console, f"{chain.name}: {chosen.time:g} s from rest", ("", ""), rows)
-    if folder is not None:
-        columns = _output.motion_columns(chain, trajectory)
-        page = viz.html(folder / "animation.html", [viz.Shown(chain, trajectory)], overwrite=chosen.overwrite)
-        for file in (_output.write_columns(folder / "motion.csv", columns), page):
-            console.print(f"  {file}", markup=False)
+    _tables.written(console, files)
     return 0

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 
+from fivebar_pin._arrays import integer, number
+from fivebar_pin._files import as_path, check_folder, check_new
+from fivebar_pin.cli import _tables
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import inverse_dynamics
 
@@ -25,11 +29,20 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin import viz
     from fivebar_pin.cli._load import load_any
 
+    number("--speed", chosen.speed, positive=True)
+    if chosen.port is not None:
+        integer("--port", chosen.port, least=0, most=65535)
+    if chosen.html is not None:
+        file = as_path(chosen.html)
+        check_folder(file.parent, overwrite=True)
+        if os.path.lexists(file):
+            check_new(file, overwrite=chosen.overwrite)
     chain = load_any(chosen.path)
     trajectory = moved(chain, chosen.motion)
     shown = [viz.Shown(chain, trajectory, inverse_dynamics(chain, trajectory) if len(trajectory) > 1 else None)]
-    if chosen.html:
-        viz.html(chosen.html, shown, speed=chosen.speed, overwrite=chosen.overwrite)
+    if chosen.html is not None:
+        page = viz.html(chosen.html, shown, speed=chosen.speed, overwrite=chosen.overwrite)
+        _tables.written(_tables.console(), (page,))
         return 0
-    viz.view(shown, port=chosen.port, speed=chosen.speed)
+    viz.view(shown, port=chosen.port, speed=chosen.speed, announce=_tables.announce)
     return 0

@@ -9,11 +9,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import checked
+from fivebar_pin._files import MAX_BYTES, as_path
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
-from fivebar_pin.io._files import MAX_BYTES, as_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
 from fivebar_pin.io._tree import TreeEntry
 from fivebar_pin.io._urdf import read_urdf

@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
+from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._build import build_model
-from fivebar_pin.io._files import MAX_BYTES
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
 from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
 from fivebar_pin.io._sidecar import Sidecar

@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from fivebar_pin._files import as_path, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
-from fivebar_pin.io._files import as_path, output_folder, write_all
 from fivebar_pin.io._sidecar import dump_sidecar
 from fivebar_pin.io._urdf_text import urdf_and_sidecar
 
-__all__ = ["save"]
+__all__ = ["save", "texts"]
 
 FORMATS = ("urdf", "mjcf")
 
@@ -52,21 +52,27 @@ def save(
         target, stem = target.parent, target.stem
     else:
         stem = _stem(chain, name)
+    return write_set(target, texts(chain, target, name=stem, formats=formats), overwrite=overwrite)
+
+
+def texts(
+    chain: ClosedChain, folder: Path, *, name: str | None = None, formats: Iterable[str] = FORMATS
+) -> dict[str, str]:
+    """Return the text of each file that `save` writes into a folder, by file name, for a set with other files."""
+    stem = _stem(chain, name)
     wanted = (formats,) if isinstance(formats, str) else tuple(formats)
     for word in wanted:
         if word not in FORMATS:
             raise UnknownNameError("format", word, FORMATS)
-    files: dict[Path, str] = {}
+    files: dict[str, str] = {}
     if "urdf" in wanted:
-        text, sidecar = urdf_and_sidecar(chain, target)
-        files[target / f"{stem}.urdf"] = text
-        files[target / f"{stem}.yaml"] = dump_sidecar(sidecar)
+        text, sidecar = urdf_and_sidecar(chain, folder)
+        files |= {f"{stem}.urdf": text, f"{stem}.yaml": dump_sidecar(sidecar)}
     if "mjcf" in wanted:
         from fivebar_pin.io._mjcf_text import mjcf_text
 
-        files[target / f"{stem}.xml"] = mjcf_text(chain, target)
-    output_folder(target)
-    return write_all(files, overwrite=overwrite)
+        files[f"{stem}.xml"] = mjcf_text(chain, folder)
+    return files
 
 
 def _stem(chain: ClosedChain, name: str | None) -> str:

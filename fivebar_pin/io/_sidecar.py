@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fivebar_pin._files import read_bounded
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
-from fivebar_pin.io._files import read_bounded
 from fivebar_pin.io._xml import HUGE, UNLIMITED
 
 __all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "UNIVERSAL", "Sidecar", "dump_sidecar", "read_sidecar"]

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
+from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import Visual
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._build import bare_inertia
-from fivebar_pin.io._files import MAX_BYTES
 from fivebar_pin.io._tree import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
 from fivebar_pin.io._xml import Reader, parse_xml
 

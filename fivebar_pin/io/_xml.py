@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+from fivebar_pin._files import MAX_BYTES, read_bounded
 from fivebar_pin.errors import FileFormatError, UnknownNameError
-from fivebar_pin.io._files import MAX_BYTES, read_bounded
 
 __all__ = ["HUGE", "UNLIMITED", "Reader", "parse_xml"]
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
+from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, body_names, ground_closures, is_counterweight
 from fivebar_pin.viz._record import Colour, Recorder
 from fivebar_pin.viz._stage import Stage
@@ -54,11 +55,15 @@ def describe(
 def render(title: str, scene: Mapping[str, Any], *, live: bool = False) -> str:
     """Return the whole page, the viewer's own program included."""
     viewer = resources.files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
+    try:
+        text = json.dumps(scene, allow_nan=False)
+    except ValueError as error:
+        raise InvalidInputError("scene", float("nan"), "a page shows finite numbers only") from error
     template = resources.files("fivebar_pin.viz").joinpath("page.html").read_text(encoding="utf-8")
     return string.Template(template).substitute(
         title=html.escape(title),
         viewer=viewer.replace("</script", "<\\/script"),
-        scene=json.dumps(scene, allow_nan=False).replace("<", "\\u003c"),
+        scene=text.replace("<", "\\u003c"),
         connect="'self'" if live else "'none'",
         live="true" if live else "false",
     )

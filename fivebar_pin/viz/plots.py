@@ -7,6 +7,8 @@ global state of pyplot alone.
 
 from __future__ import annotations
 
+import io
+import os
 from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -15,8 +17,9 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, figures, settled
-from fivebar_pin.errors import InvalidInputError, OutputError
+from fivebar_pin._arrays import Array, checked, figures, integer, settled
+from fivebar_pin._files import write_set
+from fivebar_pin.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,12 +28,15 @@ if TYPE_CHECKING:
     from fivebar_pin.dynamics import Loads
     from fivebar_pin.motion import Motion
 
-__all__ = ["com", "forces", "frame", "motion", "save", "shaking", "torques"]
+__all__ = ["com", "forces", "frame", "motion", "png", "save", "shaking", "torques"]
 
 _T = TypeVar("_T")
 
 _VISIBLE = 1e-9
 """Share of the largest component below which another one cannot be seen [-]."""
+_MOST_DPI = 1000
+"""More makes pictures larger than can be drawn [dots per inch]."""
+
 _STYLES = (
     ("#D55E00", "-", 2.0),
     ("#0072B2", "--", 2.0),
@@ -173,7 +179,7 @@ def save(figures: Mapping[str, Figure], folder: str | Path, *, overwrite: bool =
     Args:
         figures: figures by file name, without ending.
         folder: where they go.
-        overwrite: whether existing files may be replaced; if not, nothing at all is written when one exists.
+        overwrite: whether existing files may be replaced; all are written or, after an error, none.
         dpi: dots per inch.
 
     Returns:
@@ -182,20 +188,26 @@ def save(figures: Mapping[str, Figure], folder: str | Path, *, overwrite: bool =
     Raises:
         OutputError: a file exists, or cannot be written.
     """
+    return list(write_set(folder, png(figures, dpi=dpi), overwrite=overwrite))
+
+
+def png(figures: Mapping[str, Figure], *, dpi: int = 130) -> dict[str, bytes]:
+    """Return each figure as the content of a PNG file, by file name.
+
+    Args:
+        figures: figures by file name, without ending.
+        dpi: dots per inch.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    paths = [Path(folder) / f"{name}.png" for name in figures]
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise OutputError(path, "exists already; choose another folder or allow overwriting")
-    for path, figure in zip(paths, figures.values(), strict=True):
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            FigureCanvasAgg(figure)
-            figure.savefig(path, dpi=dpi)
-        except OSError as error:
-            raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
-    return paths
+    integer("dpi", dpi, least=1, most=_MOST_DPI)
+    out = {}
+    for name, figure in figures.items():
+        FigureCanvasAgg(figure)
+        content = io.BytesIO()
+        figure.savefig(content, dpi=dpi, format="png")
+        out[f"{name}.png"] = content.getvalue()
+    return out
 
 
 def _over_time(
@@ -228,10 +240,18 @@ def _show_round_off(ax: Axes, curves: Sequence[Array], scale: float) -> None:
         ax.set_ylim(-1.0, 1.0)
 
 
-def _sheet(rows: int, columns: int, title: str, *, height: float) -> tuple[Figure, list[Axes]]:
-    from matplotlib.figure import Figure
+def _figure_class() -> type[Figure]:
+    """Return matplotlib's figure; it looks at the environment when it is imported, though no window is needed here."""
+    try:
+        from matplotlib.figure import Figure
+    except ValueError as error:
+        name = os.environ.get("MPLBACKEND", "")
+        raise InvalidInputError("MPLBACKEND", name, f"matplotlib refuses it ({error})", "Unset it.") from error
+    return Figure
 
-    figure = Figure(figsize=(7.5 if columns == 1 else 10.0, height), layout="constrained")
+
+def _sheet(rows: int, columns: int, title: str, *, height: float) -> tuple[Figure, list[Axes]]:
+    figure = _figure_class()(figsize=(7.5 if columns == 1 else 10.0, height), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.suptitle(title, fontweight="bold")
     axes = list(grid.flat)

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import ROUND_OFF, Array, checked
-from fivebar_pin.errors import InvalidInputError, OutputError
+from fivebar_pin._files import write_file
+from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 from fivebar_pin.viz._drawing import Drawing, reach, safe
 from fivebar_pin.viz._geometry import View, compute_poses, find_view
@@ -86,16 +87,8 @@ def html(
         InvalidInputError: nothing to show, a trajectory or loads that do not fit the chain, or a speed that is not
             positive.
     """
-    file = Path(path)
-    if file.exists() and not overwrite:
-        raise OutputError(file, "exists already; choose another name or allow overwriting")
     text = page(shown, speed=speed, title=title, spheres_by_mass=spheres_by_mass)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(file, f"cannot be written ({error.strerror or error})") from error
-    return file
+    return write_file(path, text, overwrite=overwrite)
 
 
 def page(
