@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin import _bodies
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen
 from fivebar_pin._springs import JointSpring, Spring
 from fivebar_pin._system import System, checked_wrench
 from fivebar_pin.chain import ClosedChain
@@ -17,7 +17,7 @@ from fivebar_pin.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EnergyBalance:
+class EnergyBalance(Immutable):
     """Energies [J] and powers [W] along a trajectory, n samples.
 
     Attributes:

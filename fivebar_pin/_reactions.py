@@ -9,7 +9,7 @@ import numpy as np
 
 from fivebar_pin import _bodies
 from fivebar_pin import closures as rows
-from fivebar_pin._arrays import Array, cross, frozen
+from fivebar_pin._arrays import Array, Immutable, cross, frozen
 from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin._springs import JointSpring, Spring, body_wrenches
 from fivebar_pin._tree import Poses
@@ -20,7 +20,7 @@ _OPEN = 1e-9  # force in a joint for a unit force in the closures above which th
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reactions:
+class Reactions(Immutable):
     """Reactions along a trajectory, world axes.
 
     Attributes:

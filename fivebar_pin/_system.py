@@ -19,7 +19,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _springs
-from fivebar_pin._arrays import Array, checked
+from fivebar_pin._arrays import Array, Immutable, checked
 from fivebar_pin._manifold import Manifold, Point, manifold_of
 from fivebar_pin._mass import depth_first, mass_matrix
 from fivebar_pin._springs import JointSpring, Spring, SpringForces
@@ -34,7 +34,7 @@ _MASSLESS = 1e-13  # smallest to largest eigenvalue of the reduced inertia below
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mode:
+class Mode(Immutable):
     """What dry friction does.
 
     Attributes:
@@ -47,7 +47,7 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equations:
+class Equations(Immutable):
     """Reduced equations of motion, inertia w = force and a = N w + held, over a batch.
 
     Attributes:
@@ -64,7 +64,7 @@ class Equations:
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class System(Immutable):
     """A chain with its springs, ready to give accelerations.
 
     Attributes:

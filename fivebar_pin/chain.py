@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen, seal
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -20,7 +20,7 @@ _JOINT_FRAMES = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Visual:
+class Visual(Immutable):
     """A shape drawn on a frame of the tree; it has no mass.
 
     Attributes:
@@ -50,7 +50,7 @@ class Visual:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ClosedChain:
+class ClosedChain(Immutable):
     """An open tree, the closures that make loops of it, and the joints that are driven.
 
     Args:
@@ -122,12 +122,16 @@ class ClosedChain:
     def actuated_index(self) -> npt.NDArray[np.intp]:
         """Positions of the actuated coordinates in v (na,)."""
         model = self.model
-        return np.array([model.idx_vs[model.getJointId(j)] for j in self.actuated], dtype=np.intp)
+        index = np.array([model.idx_vs[model.getJointId(j)] for j in self.actuated], dtype=np.intp)
+        seal(index)
+        return index
 
     @cached_property
     def passive_index(self) -> npt.NDArray[np.intp]:
         """Positions of the passive coordinates in v (nv - na,)."""
-        return np.setdiff1d(np.arange(self.nv), self.actuated_index)
+        index = np.setdiff1d(np.arange(self.nv), self.actuated_index)
+        seal(index)
+        return index
 
     @cached_property
     def inertial_parameters(self) -> Array:

@@ -19,7 +19,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, cross, frozen, skew
+from fivebar_pin._arrays import Array, Immutable, checked, cross, frozen, skew
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["Closure", "ClosureKind"]
@@ -49,7 +49,7 @@ class ClosureKind(str, Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Closure:
+class Closure(Immutable):
     """A loop closure between two frames of the open tree.
 
     Attributes:
@@ -89,7 +89,7 @@ class Closure:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FramePair:
+class FramePair(Immutable):
     """World poses of the two frames of a closure. R (..., 3, 3), p (..., 3)."""
 
     R1: Array

@@ -40,7 +40,7 @@ _SAMPLES_PER_THREAD = 4096
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Loads:
+class Loads(Immutable):
     """Forces and torques along a trajectory. World axes; n samples.
 
     Attributes:

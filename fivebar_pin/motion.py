@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, number, numeric
+from fivebar_pin._arrays import Array, Immutable, checked, number, numeric
 from fivebar_pin.errors import FileFormatError, InvalidInputError, OutputError
 
 __all__ = [
@@ -25,7 +25,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class Motion(Immutable):
     """Sampled motion of the actuated coordinates.
 
     Attributes:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 
@@ -14,7 +14,7 @@ __all__ = ["Trajectory"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
+class Trajectory(Immutable):
     """Consistent motion of all coordinates of a closed chain.
 
     Attributes:

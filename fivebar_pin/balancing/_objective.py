@@ -31,7 +31,7 @@ from fivebar_pin.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TermMaker:
+class TermMaker(Immutable):
     """Builds terms and limits over designs X = X0 + E y (scaled) and pi = pi0 + full_E y."""
 
     chain: ClosedChain

@@ -32,7 +32,7 @@ MEASURES = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class Rows(Immutable):
     """A quantity along motions: values = F pi + f.
 
     Attributes:

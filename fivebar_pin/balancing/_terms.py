@@ -39,7 +39,7 @@ def measure_of(term: str) -> str | None:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Term:
+class Term(Immutable):
     """One term as a function of the design variables y: a linear one, or lengths of vectors.
 
     Attributes:

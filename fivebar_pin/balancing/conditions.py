@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen, skew
+from fivebar_pin._arrays import Array, Immutable, checked, frozen, skew
 from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
@@ -39,7 +39,7 @@ _ALIKE = 1e-9  # difference up to which directions [-], points, placements and c
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class BalanceConditions:
+class BalanceConditions(Immutable):
     """Linear conditions on the inertial parameters under which a chain is balanced.
 
     Attributes:

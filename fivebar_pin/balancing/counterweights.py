@@ -42,7 +42,7 @@ _RIM = 720  # points of a rim that are asked whether they lie in the region
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Counterweight:
+class Counterweight(Immutable):
     """One piece of material fixed to a body.
 
     Attributes:
@@ -86,7 +86,7 @@ class Counterweight:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Realisation:
+class Realisation(Immutable):
     """Counterweights for a design, and the mechanism that carries them.
 
     Attributes:

@@ -27,7 +27,7 @@ __all__ = ["Certificate", "Change", "Design"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Change:
+class Change(Immutable):
     """Material added to one body (or removed from it, or the body as redesigned).
 
     Attributes:
@@ -55,7 +55,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design:
+class Design(Immutable):
     """A balanced mechanism, optimal for the objective, or the proof that there is none.
 
     Attributes:

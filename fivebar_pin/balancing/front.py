@@ -26,7 +26,7 @@ _ROOM = 1e-7  # relative room at the ends of a front, where a bound leaves no in
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ParetoFront:
+class ParetoFront(Immutable):
     """Designs of which none is better in both objectives than another.
 
     Attributes:
@@ -136,7 +136,7 @@ def alici_shirinzadeh(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison:
+class Comparison(Immutable):
     """Mechanisms with the same kinematics, side by side.
 
     Attributes:

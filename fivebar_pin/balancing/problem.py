@@ -71,7 +71,7 @@ class _Task:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class BalanceProblem:
+class BalanceProblem(Immutable):
     """A balancing problem prepared once, to be solved for any weights of its objectives.
 
     Attributes:

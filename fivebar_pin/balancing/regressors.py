@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, cross, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, cross, frozen
 from fivebar_pin.balancing._reaction_rows import marked, reactions
 from fivebar_pin.balancing._state import gravity_of, moved, side_by_side, state_of, torque_offset, tree_torque, turned
 from fivebar_pin.chain import ClosedChain
@@ -33,7 +33,7 @@ __all__ = ["QUANTITIES", "Regressor", "regressor"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Regressor:
+class Regressor(Immutable):
     """One quantity as matrix times inertial parameters, plus what does not depend on them.
 
     Attributes:

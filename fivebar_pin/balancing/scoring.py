@@ -29,7 +29,7 @@ _SINGLE = 200_000  # multiplications in a matrix product that stays on one threa
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Scores:
+class Scores(Immutable):
     """Values of the terms for every design.
 
     Attributes:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin.paper.linkage import FiveBar
 
 __all__ = ["EQUATIONS", "Conditions", "conditions"]
@@ -30,7 +30,7 @@ RIGHT = frozen([0.0] * 6 + [1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Conditions:
+class Conditions(Immutable):
     """How far a linkage is from force balance.
 
     Attributes:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.paper.equations import RIGHT, ROWS
 
 __all__ = ["Problem", "Stationary", "alone", "climb"]
@@ -21,7 +21,7 @@ _NEAR = 1e-7  # a variable this close to its bound after the first solver is tri
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class Problem(Immutable):
     """Minimise (77) under the conditions.
 
     Attributes:
@@ -88,7 +88,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stationary:
+class Stationary(Immutable):
     """A point and what is known of its optimality.
 
     Attributes:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin.paper.linkage import AssemblyMode, CArray, FiveBar
 from fivebar_pin.trajectory import Trajectory
 
@@ -15,7 +15,7 @@ __all__ = ["Solution"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution:
+class Solution(Immutable):
     """Motion and loads of the five-bar. Columns of angles, rates and accelerations: psi, theta, phi, gamma.
 
     Attributes:
@@ -88,7 +88,7 @@ class Solution:
     def energy(self) -> Array:
         """Kinetic energy (n,) [J]."""
         m, c = self.linkage.masses, _mass_centre_rates(self.linkage, self.angles, self.rates)
-        return np.asarray(0.5 * ((np.abs(c) ** 2) @ m + (self.rates**2) @ self.linkage.inertias))
+        return frozen(0.5 * ((np.abs(c) ** 2) @ m + (self.rates**2) @ self.linkage.inertias))
 
 
 def _relative(x: Array) -> Array:
