@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from functools import wraps
+from numbers import Real
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +16,8 @@ from fivebar_pin.errors import InvalidInputError
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T", bound="Immutable")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 class Immutable:
@@ -67,16 +71,66 @@ def frozen(values: npt.ArrayLike) -> Array:
     return array
 
 
+def reals(name: str, values: npt.ArrayLike) -> Array:
+    """Return what a user gave as an array of real numbers, the same memory where it is one already.
+
+    Nothing is made a number that is none: complex values would lose a part, masked ones their mask, instants their
+    unit; truth values and digits in a string are mistakes more often than numbers.
+
+    Raises:
+        InvalidInputError: anything but integers and real numbers, or ragged.
+    """
+    try:
+        if _masked(values):
+            raise InvalidInputError(
+                name, "a masked array", "must be an array of numbers only", "Fill in what is missing."
+            )
+        given = np.asarray(values)
+        if given.dtype.kind == "O":
+            return np.array([_real(x) for x in given.flat], dtype=np.float64).reshape(given.shape)
+    except InvalidInputError:
+        raise
+    except Exception as error:  # a stranger's object may raise anything where NumPy asks it for its numbers
+        raise InvalidInputError(name, values, f"must be an array of numbers only ({error})") from error
+    if given.size and given.dtype.kind not in "fiu":
+        kind = _REFUSED.get(given.dtype.kind, f"of type {given.dtype}")
+        raise InvalidInputError(name, values, f"must be an array of numbers only; these are {kind}")
+    with np.errstate(over="ignore"):  # a long double beyond float becomes infinite, which is refused as such
+        return given.astype(np.float64, copy=False) if given.size else np.zeros(given.shape)
+
+
+_REFUSED = {
+    "b": "truth values",
+    "c": "complex, and would lose their imaginary parts",
+    "M": "instants of a calendar",
+    "m": "spans of a calendar",
+    "S": "bytes",
+    "T": "text",
+    "U": "text",
+}
+
+
+def _masked(values: object) -> bool:
+    """Tell whether there is a mask; NumPy passes over one inside a list."""
+    if isinstance(values, (list, tuple)):
+        return any(_masked(x) for x in values if isinstance(x, (list, tuple, np.ma.MaskedArray)))
+    return isinstance(values, np.ma.MaskedArray)
+
+
+def _real(value: object) -> float:
+    """Return a number of another make (a fraction, a long integer) as a float."""
+    if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{type(value).__name__} is not a real number")
+    return float(value)
+
+
 def numeric(name: str, values: npt.ArrayLike) -> Array:
     """Return a read-only float copy of any shape.
 
     Raises:
-        InvalidInputError: not numeric, or ragged.
+        InvalidInputError: see `reals`.
     """
-    try:
-        return frozen(values)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(name, values, f"must be an array of numbers ({error})") from error
+    return frozen(reals(name, values))
 
 
 def checked(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> Array:
@@ -103,15 +157,77 @@ def number(name: str, value: object, *, positive: bool = False, unit: str = "") 
         InvalidInputError: not a number, not finite, or not positive where it must be.
     """
     try:
-        x = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidInputError(name, value, f"must be one number ({error})") from error
+        x = reals(name, value)  # type: ignore[arg-type]
+    except InvalidInputError as error:
+        raise InvalidInputError(name, value, "must be one number") from error
+    if x.ndim:
+        raise InvalidInputError(name, value, "must be one number")
     tail = f" [{unit}]" if unit else ""
     if positive and not (np.isfinite(x) and x > 0.0):
-        raise InvalidInputError(name, x, f"must be positive and finite{tail}")
+        raise InvalidInputError(name, value, f"must be positive and finite{tail}")
     if not np.isfinite(x):
-        raise InvalidInputError(name, x, f"must be finite{tail}")
-    return x
+        raise InvalidInputError(name, value, f"must be finite{tail}")
+    return float(x)
+
+
+def integer(name: str, value: object, *, least: int = 0) -> int:
+    """Return a whole number that is large enough.
+
+    Raises:
+        InvalidInputError: not an integer, or less than `least`.
+    """
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidInputError(name, value, f"must be an integer of at least {least}")
+    return int(value)
+
+
+def finite(*, open: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Make a function that computes refuse to hand out numbers that are none, and keep NumPy's warnings of them inside.
+
+    Finite arguments can be too large for what is computed from them (the square of a speed of 1e200); infinity and
+    nan in the result would then pass for an answer.
+
+    Args:
+        open: names of results that hold nan where something is undetermined, as their documentation says (a single
+                number: infinity too).
+    """
+
+    def decorate(compute: Callable[P, R]) -> Callable[P, R]:
+        @wraps(compute)
+        def computed(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                with np.errstate(all="ignore"):
+                    result = compute(*args, **kwargs)
+            except (np.linalg.LinAlgError, FloatingPointError, OverflowError) as error:
+                raise InvalidInputError(compute.__name__, str(error), _BEYOND, _SMALLER) from error
+            _require_finite(compute.__name__, result, open)
+            return result
+
+        return computed
+
+    return decorate
+
+
+_BEYOND = "cannot be computed in double precision from these numbers"
+_SMALLER = "Check the units and sizes of what was given."
+
+
+def _require_finite(name: str, result: object, open: tuple[str, ...]) -> None:
+    """Raise for infinity, and for nan outside the results named as open, in arrays and fields that hold them."""
+    if isinstance(result, np.ndarray):
+        if result.dtype.kind in "fc" and not np.isfinite(result).all():
+            bad = np.argwhere(np.isinf(result) if name in open else ~np.isfinite(result))
+            if bad.size:
+                index = tuple(int(i) for i in bad[0])
+                raise InvalidInputError(f"{name}{list(index)}", result[index].item(), _BEYOND, _SMALLER)
+    elif is_dataclass(result):
+        for f in fields(result):
+            _require_finite(f.name, getattr(result, f.name), open)
+    elif isinstance(result, (tuple, Mapping)):
+        for key, item in result.items() if isinstance(result, Mapping) else enumerate(result):
+            _require_finite(key if isinstance(key, str) else name, item, open)
+    elif isinstance(result, float) and name not in open and not np.isfinite(result):
+        raise InvalidInputError(name, result, _BEYOND, _SMALLER)
 
 
 def skew(x: Array) -> Array:

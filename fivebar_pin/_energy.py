@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin import _bodies
-from fivebar_pin._arrays import Array, Immutable, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen
 from fivebar_pin._springs import JointSpring, Spring
 from fivebar_pin._system import System, checked_wrench
 from fivebar_pin.chain import ClosedChain
@@ -64,6 +64,7 @@ class EnergyBalance(Immutable):
         return float(mismatch.max() / max(float(self.exchanged.max()), 1e-300))
 
 
+@finite()
 def energy_balance(
     chain: ClosedChain,
     trajectory: Trajectory,

@@ -9,7 +9,7 @@ import numpy as np
 
 from fivebar_pin import _bodies
 from fivebar_pin import closures as rows
-from fivebar_pin._arrays import Array, Immutable, cross, frozen
+from fivebar_pin._arrays import Array, Immutable, cross, finite, frozen
 from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin._springs import JointSpring, Spring, body_wrenches
 from fivebar_pin._tree import Poses
@@ -56,6 +56,7 @@ class Reactions(Immutable):
     mismatch: float
 
 
+@finite(open=("closure", "closure_local", "joint", "joint_local"))
 def reactions(
     chain: ClosedChain,
     trajectory: Trajectory,

@@ -19,7 +19,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _springs
-from fivebar_pin._arrays import Array, Immutable, checked
+from fivebar_pin._arrays import Array, Immutable, checked, numeric
 from fivebar_pin._manifold import Manifold, Point, manifold_of
 from fivebar_pin._mass import depth_first, mass_matrix
 from fivebar_pin._springs import JointSpring, Spring, SpringForces
@@ -197,7 +197,7 @@ def checked_wrench(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] | N
     out = {}
     for name, wrench in (external or {}).items():
         check_frame(chain, name)
-        w = np.asarray(wrench, dtype=np.float64)
+        w = numeric(f"external[{name!r}]", wrench)
         out[name] = checked(f"external[{name!r}]", np.broadcast_to(w, (n, 6)) if w.shape == (6,) else w, (n, 6))
     return out
 

@@ -71,10 +71,11 @@ class Closure(Immutable):
         object.__setattr__(self, "frames", frames)
         object.__setattr__(self, "kind", ClosureKind.parse(self.kind))
         axis = checked("closure axis", self.axis, (3,))
-        length = float(np.linalg.norm(axis))
-        if length < 1e-9:
+        longest = float(np.abs(axis).max())
+        if longest < 1e-9:
             raise InvalidInputError("closure axis", axis.tolist(), "must not be zero")
-        object.__setattr__(self, "axis", frozen(axis / length))
+        axis = axis / longest if longest > 1e100 else axis  # the square of its length would overflow
+        object.__setattr__(self, "axis", frozen(axis / np.linalg.norm(axis)))
         object.__setattr__(self, "name", self.name or f"{frames[0]}~{frames[1]}")
 
     @property

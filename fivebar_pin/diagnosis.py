@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _mobility, _plausible
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, checked, frozen, integer
 from fivebar_pin._diagnosis import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._mobility import Site
@@ -44,6 +44,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     Raises:
         InvalidInputError: q of the wrong shape or not finite.
     """
+    integer("seed", seed)
     loops = loops_of(chain)
     findings: list[Finding] = []
     start, gap = _start(chain, q, seed, findings)

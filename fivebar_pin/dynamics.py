@@ -82,6 +82,7 @@ class Loads(Immutable):
         return bool(heavy or any(w.any() for w in self.external.values()))
 
     @cached_property
+    @finite()
     def com(self) -> Array:
         """Centre of mass of all moving bodies (n, 3) [m]."""
         loops = loops_of(self.chain)
@@ -136,12 +137,14 @@ class Loads(Immutable):
         return frozen(0.5 * np.sum(np.array(self.chain.model.armature) * self.trajectory.v**2, axis=1))
 
     @cached_property
+    @finite()
     def potential_energy(self) -> Array:
         """Potential energy of gravity, zero at the world origin (n,) [J]."""
         gravity = np.array(self.chain.model.gravity.linear)
         return frozen(-self.chain.mass * self.com @ gravity)
 
     @cached_property
+    @finite()
     def elastic_energy(self) -> Array:
         """Energy stored in the springs (n,) [J]."""
         return frozen(self._sprung.energy)
@@ -244,6 +247,7 @@ class Loads(Immutable):
         return mismatch / max(sum(float(np.abs(x[..., :3]).max(initial=0.0)) for x in sizes), 1e-300)
 
 
+@finite(open=("N", "torque"))
 def inverse_dynamics(
     chain: ClosedChain,
     trajectory: Trajectory,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, checked, number, numeric
+from fivebar_pin._arrays import Array, Immutable, checked, finite, number, numeric
 from fivebar_pin.errors import FileFormatError, InvalidInputError, OutputError
 
 __all__ = [
@@ -65,6 +65,7 @@ class Motion(Immutable):
         """Number of actuated coordinates."""
         return int(self.q.shape[1])
 
+    @finite()
     def scaled(self, speed: float) -> Motion:
         """Return the same path run `speed` times as fast."""
         k = number("speed", speed, positive=True)
@@ -89,6 +90,7 @@ def constant(t: npt.ArrayLike, value: float) -> Motion:
     return _column(time, zero + number("value", value), zero, zero)
 
 
+@finite()
 def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | None = None) -> Motion:
     """Move from start to stop along a cycloid: q = start + h (s - sin(2 pi s) / 2 pi), s = (t - t_0) / duration.
 
@@ -110,6 +112,7 @@ def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | 
     )
 
 
+@finite()
 def harmonic(t: npt.ArrayLike, mean: float, amplitude: float, *, period: float, phase: float = 0.0) -> Motion:
     """Swing about a mean: q = mean + amplitude cos(2 pi t / period + phase)."""
     time = checked("t", t, (None,))
@@ -118,6 +121,7 @@ def harmonic(t: npt.ArrayLike, mean: float, amplitude: float, *, period: float, 
     return _column(time, centre + h * np.cos(x), -h * w * np.sin(x), -h * w**2 * np.cos(x))
 
 
+@finite()
 def polynomial(
     t: npt.ArrayLike, start: float, stop: float, *, degree: int = 5, duration: float | None = None
 ) -> Motion:
@@ -141,6 +145,7 @@ def polynomial(
     return _column(time, low + h * p(s), moving * h / T * p.deriv()(s), moving * h / T**2 * p.deriv(2)(s))
 
 
+@finite()
 def spline(t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, periodic: bool = False) -> Motion:
     """Pass through given values with a quintic spline (continuous to the fourth derivative).
 

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, Immutable, checked, frozen, skew
+from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integer, skew
 from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
@@ -120,6 +120,7 @@ class BalanceConditions(Immutable):
         return np.asarray(subspace_angles(self.basis.T, rows.T))
 
 
+@finite(open=("gap",))
 def balance_conditions(
     chain: ClosedChain,
     kind: str,
@@ -155,9 +156,7 @@ def balance_conditions(
     """
     if kind not in KINDS:
         raise UnknownNameError("kind of balance", kind, KINDS)
-    count = max(200, 20 * len(chain.joints)) if samples is None else samples
-    if not isinstance(count, (int, np.integer)) or count < 10:
-        raise InvalidInputError("samples", samples, "must be an integer of at least 10")
+    count = integer("samples", max(200, 20 * len(chain.joints)) if samples is None else samples, least=10)
     point = checked("about", about, (3,))
     direction = _direction(chain, gravity) if kind == "static" else None
     drawn = random_samples(chain, int(count), near=near, seed=seed)

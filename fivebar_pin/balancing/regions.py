@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen, number
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -163,5 +163,5 @@ def _placement(frame: str, chain: ClosedChain, body: int) -> tuple[Array, Array]
 
 
 def _positive(name: str, value: float) -> None:
-    if not (isinstance(value, (int, float, np.floating, np.integer)) and np.isfinite(value) and value > 0.0):
+    if number(name, value, unit="m") <= 0.0:
         raise InvalidInputError(name, value, "must be positive and finite [m]", "An empty region holds no material.")

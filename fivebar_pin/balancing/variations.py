@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, frozen, integer, number
 from fivebar_pin.balancing._parameters import from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
@@ -30,17 +30,14 @@ def variations(chain: ClosedChain, count: int, *, spread: float = 0.2, seed: int
         spread: typical relative change s, between 0 and 0.9 [-].
         seed: of the draw.
     """
-    if not isinstance(count, (int, np.integer)) or count < 1:
-        raise InvalidInputError("count", count, "must be an integer of at least 1")
-    if not 0.0 <= spread <= 0.9:
+    count = integer("count", count, least=1)
+    if not 0.0 <= number("spread", spread) <= 0.9:
         raise InvalidInputError("spread", spread, "must lie between 0 and 0.9")
-    if not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InvalidInputError("seed", seed, "must be an integer, not negative")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(integer("seed", seed))
     own = np.array(chain.inertial_parameters)
     P = pseudo_inertia(own)  # (nb, 4, 4)
-    out = np.empty((int(count), *own.shape))
-    for start in range(0, int(count), _BLOCK):
+    out = np.empty((count, *own.shape))
+    for start in range(0, count, _BLOCK):
         part = out[start : start + _BLOCK]
         A = spread * rng.uniform(-1.0, 1.0, (*part.shape[:2], 4, 4))
         A[..., 3, :3] = 0.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, checked, frozen, number, numeric
+from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, number, numeric
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, SolverError
 from fivebar_pin.paper.equations import Conditions, conditions
 from fivebar_pin.paper.linkage import FiveBar
@@ -65,6 +65,7 @@ class Optimum(Immutable):
         )
 
 
+@finite()
 def balance(
     linkage: FiveBar,
     *,
@@ -99,6 +100,7 @@ def balance(
     return _best(linkage, problem, only or starts, points, tolerance)
 
 
+@finite()
 def balance_masses(
     linkage: FiveBar,
     *,

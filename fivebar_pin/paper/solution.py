@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, Immutable, frozen
+from fivebar_pin._arrays import Array, Immutable, finite, frozen
 from fivebar_pin.paper.linkage import AssemblyMode, CArray, FiveBar
 from fivebar_pin.trajectory import Trajectory
 
@@ -77,6 +77,7 @@ class Solution(Immutable):
         return Trajectory(self.t, frozen(q), frozen(v), frozen(a), frozen(N), frozen(self.closure_residual))
 
     @cached_property
+    @finite()
     def closure_residual(self) -> Array:
         """How far the loop (1) stays open, the larger component along and across link 2, from the angles (n,) [m]."""
         turn = np.exp(1j * self.angles)
@@ -85,6 +86,7 @@ class Solution(Immutable):
         return np.asarray(np.maximum(np.abs(gap.real), np.abs(gap.imag)))
 
     @cached_property
+    @finite()
     def energy(self) -> Array:
         """Kinetic energy (n,) [J]."""
         m, c = self.linkage.masses, _mass_centre_rates(self.linkage, self.angles, self.rates)

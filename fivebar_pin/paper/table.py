@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_pin import motion as laws
-from fivebar_pin._arrays import number
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin._arrays import integer, number
+from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper.linkage import FiveBar
 
@@ -88,9 +88,8 @@ def default_motion(*, samples: int = 201, period: float = 1.0) -> Motion:
         samples: number of instants over [0, period], both ends included.
         period: duration [s].
     """
-    if not isinstance(samples, (int, np.integer)) or samples < 2:
-        raise InvalidInputError("samples", samples, "must be an integer of at least 2")
+    samples = integer("samples", samples, least=2)
     number("period", period, positive=True, unit="s")
-    t = np.linspace(0.0, period, int(samples))
+    t = np.linspace(0.0, period, samples)
     psi = laws.cycloidal(t, 0.0, 2.0 * np.pi, duration=period)
     return laws.combine(psi, laws.harmonic(t, np.pi / 2.0, -np.pi / 6.0, period=period))
