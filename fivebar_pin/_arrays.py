@@ -164,9 +164,9 @@ def number(name: str, value: object, *, positive: bool = False, unit: str = "") 
         raise InvalidInputError(name, value, "must be one number")
     tail = f" [{unit}]" if unit else ""
     if positive and not (np.isfinite(x) and x > 0.0):
-        raise InvalidInputError(name, value, f"must be positive and finite{tail}")
+        raise InvalidInputError(name, float(x), f"must be positive and finite{tail}")
     if not np.isfinite(x):
-        raise InvalidInputError(name, value, f"must be finite{tail}")
+        raise InvalidInputError(name, float(x), f"must be finite{tail}")
     return float(x)
 
 

@@ -78,7 +78,7 @@ def run(chosen: argparse.Namespace) -> int:
     number("speed", chosen.speed, positive=True)
     mode = paper.AssemblyMode[chosen.mode.upper()]
     motion = (
-        laws.from_file(chosen.motion)
+        laws.from_file(chosen.motion, ("psi", "gamma"))
         if chosen.motion
         else paper.default_motion(samples=chosen.samples, period=chosen.period)
     )

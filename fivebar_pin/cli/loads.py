@@ -41,7 +41,7 @@ def run(chosen: argparse.Namespace) -> int:
     console = _tables.console()
     _print(console, chain, trajectory, loads)
     if folder is not None:
-        motion = laws.from_file(chosen.motion) if chosen.motion else None
+        motion = laws.from_file(chosen.motion, chain.actuated) if chosen.motion else None
         for file in _write(folder, chain, trajectory, loads, motion, overwrite=chosen.overwrite):
             console.print(f"  {file}", markup=False)
     return 0
