@@ -23,7 +23,10 @@ import fivebar_pin as fb
 from fivebar_pin import balancing, errors, paper
 from fivebar_pin._arrays import Immutable
 from fivebar_pin._springs import JointSpring, Spring
+from fivebar_pin.balancing import solvers
 from fivebar_pin.balancing.branches import branches
+from fivebar_pin.balancing.solvers.answer import Answer
+from fivebar_pin.balancing.solvers.program import Problem
 from fivebar_pin.paper import polar
 from fivebar_pin.paper.kinematics import position
 from tests import mechanisms
@@ -153,6 +156,14 @@ def specimens() -> tuple[object, ...]:
     task = polar.Problem((1.0, 1.0), np.r_[np.full(4, -1.0), np.zeros(4), np.ones(4)], np.full(12, 2.0))
     angles = (moved.q[:, 0], moved.q[:, 1])
     inner = (balancing.Ball(0.1), task, polar.alone(task, np.ones(12)), position(linkage, *angles))
+    program = solvers.Program(1, [solvers.Block("x >= 1", "nonneg", np.eye(1), -np.ones(1))])
+    conic = solvers.solve(program, np.zeros(1), np.ones(1))
+    small = (
+        conic,
+        Problem(program, np.zeros(1), np.ones(1), -np.ones(1)),
+        Answer("solved", np.ones(1), np.ones(1), ""),
+    )
+    inner += (*small, balancing.pieces.Bar("steel", 0.01), balancing.pieces.Sphere("steel"))
     own = (*inner, paper.balance(linkage), paper.conditions(linkage), paper.audit_table_1(), paper.errata())
     return (
         *(chain, motion, trajectory, loads, free, energy, linkage, five, solution, problem, design, none, front, score),

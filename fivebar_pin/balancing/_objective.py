@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable, reals
 from fivebar_pin.balancing._quantities import Rows, reflected_inertia
 from fivebar_pin.balancing._setup import Setup
 from fivebar_pin.balancing._terms import (

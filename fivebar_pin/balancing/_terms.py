@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable, reals
 from fivebar_pin.balancing._quantities import MEASURES, Rows
 from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.errors import InvalidInputError, UnknownNameError

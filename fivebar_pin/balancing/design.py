@@ -46,7 +46,7 @@ class Change(Immutable):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Asked:
+class Asked(Immutable):
     """What a design answers: the problem, the weights of its terms, and limits besides those of the problem."""
 
     given: Given

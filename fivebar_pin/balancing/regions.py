@@ -96,7 +96,7 @@ Region = Ball | Box | Ellipsoid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shape:
+class Shape(Immutable):
     """A region in the coordinates of one body's space (d = 2 planar, 3 spatial), lengths in any one unit.
 
     Attributes:

@@ -14,7 +14,7 @@ __all__ = ["Answer", "Solver", "nothing"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
+class Answer(Immutable):
     """One answer of a solver to a problem.
 
     Attributes:

@@ -26,7 +26,7 @@ _LEAST = 1e-15  # nothing is proved better than this [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Certificate:
+class Certificate(Immutable):
     """A proof that a set of conditions and bounds has no solution.
 
     Attributes:

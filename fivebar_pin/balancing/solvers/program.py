@@ -19,7 +19,7 @@ __all__ = ["Block", "Problem", "Program"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Block:
+class Block(Immutable):
     """Rows g + G x in one cone: "zero", "nonneg", "soc" or "psd" (scaled upper triangle, column by column).
 
     Attributes:
@@ -77,7 +77,7 @@ class Program:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class Problem(Immutable):
     """One objective over the constraints of a program.
 
     Attributes:
