@@ -12,6 +12,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, figures
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
+from fivebar_pin.cli._load import add_gravity, load_any
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.errors import FileFormatError, InvalidInputError
 
@@ -48,18 +49,18 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--best", type=int, default=5, metavar="K", help="how many designs to list, by the first term [5]"
     )
     parser.add_argument("--out", metavar="CSV", help="write all scores as a table")
+    add_gravity(parser)
     parser.set_defaults(run=run)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Read or draw the designs, score them with progress, print the best, write all."""
     from fivebar_pin.balancing import variations
-    from fivebar_pin.cli._load import load_any
 
     if chosen.best < 1:
         raise InvalidInputError("--best", chosen.best, "must be at least 1")
     out = _output.fresh_file(Path(chosen.out)) if chosen.out else None
-    chain = load_any(chosen.path)
+    chain = load_any(chosen.path, chosen.gravity)
     if chosen.designs:
         designs = _read(Path(chosen.designs), chain)
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from fivebar_pin.cli._load import add_gravity, load_any
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import inverse_dynamics
 
@@ -17,15 +18,15 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     parser.add_argument("--speed", type=float, default=1.0, help="playing speed over real time [1]")
     parser.add_argument("--port", type=int, help="port of the live view (loopback only); a free one unless given")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    add_gravity(parser)
     parser.set_defaults(run=run)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Load, move and show the mechanism."""
     from fivebar_pin import viz
-    from fivebar_pin.cli._load import load_any
 
-    chain = load_any(chosen.path)
+    chain = load_any(chosen.path, chosen.gravity)
     trajectory = moved(chain, chosen.motion)
     shown = [viz.Shown(chain, trajectory, inverse_dynamics(chain, trajectory) if len(trajectory) > 1 else None)]
     if chosen.html:

@@ -14,6 +14,7 @@ from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
 from fivebar_pin.io._files import MAX_BYTES, as_path
+from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
 from fivebar_pin.io._tree import TreeEntry
 from fivebar_pin.io._urdf import read_urdf
@@ -34,7 +35,8 @@ def load(
 
     Args:
         path: a folder with one URDF (and its sidecar) or one MJCF file; a .urdf file whose sidecar lies beside it
-            under the same name (.yaml or .yml), or as the folder's only sidecar; or an MJCF .xml file.
+            under the same name (.yaml or .yml), or as the folder's only sidecar; an MJCF .xml file; or the name of a
+            mechanism that ships (`shipped`), where no file or folder is called so.
         free_flyer: put the root of a URDF on a free-flying base.
         closures: use these instead of the file's closures; with `actuated`, no sidecar is needed.
         actuated: drive these joints instead of the file's.
@@ -46,9 +48,10 @@ def load(
 
     Raises:
         FileFormatError: a file is missing, malformed or states something impossible; names file, element, way out.
-        InvalidInputError, UnknownNameError: an argument of this call is wrong.
+        InvalidInputError, UnknownNameError: an argument of this call is wrong, or no file and no mechanism that ships
+            has this name.
     """
-    where = as_path(path)
+    where = _named(as_path(path))
     file = _mechanism_file(where)
     given_closures = None if closures is None else _closures(closures)
     given_actuated = None if actuated is None else _names(actuated)
@@ -79,6 +82,18 @@ def _names(actuated: Iterable[str]) -> tuple[str, ...]:
         if not isinstance(name, str):
             raise InvalidInputError("actuated", name, "must be joint names")
     return names
+
+
+def _named(path: Path) -> Path:
+    """Return the path, or the mechanism that ships under a bare name that is no file."""
+    try:
+        if path.name != str(path) or path.suffix or path.exists():
+            return path
+    except OSError as error:
+        raise FileFormatError(path, f"cannot be looked at ({error.strerror or error})") from error
+    if path.name not in shipped():
+        raise UnknownNameError("file, folder or shipped mechanism", path.name, shipped())
+    return shipped_path(path.name)
 
 
 def _mechanism_file(path: Path) -> Path:
