@@ -60,7 +60,8 @@ def run(
         if progress is not None:
             progress((steps.node.t - float(times[0])) / float(times[-1] - times[0]))
     raise SolverError(
-        f"the simulation took {step + 1} of {max_steps} steps to get to t = {steps.node.t:.6g} s of {times[-1]:.6g} s. "
+        f"the simulation took {step + 1} steps (of {max_steps}) to get to t = {steps.node.t:.6g} s of "
+        f"{times[-1]:.6g} s. "
         "The motion is stiff or not smooth (very stiff springs, a torque with jumps): loosen rtol and "
         "atol, or raise max_steps."
     )

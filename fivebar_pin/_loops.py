@@ -13,7 +13,7 @@ from fivebar_pin import closures as rows
 from fivebar_pin._arrays import Array
 from fivebar_pin._once import once_per_chain
 from fivebar_pin._tree import Poses, Rates, Tree
-from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import Closure, FramePair
 from fivebar_pin.errors import AssemblyError, InvalidInputError
 
@@ -109,9 +109,9 @@ class Loops:
         self.actuated, self.passive = chain.actuated_index, chain.passive_index
         self.length = chain.length
         self.anchored: list[_Anchored] = []
-        start = 0
+        start, named = 0, frames_by_name(model) if chain.closures else {}
         for closure in chain.closures:
-            frames = [find_frame(model, f) for f in closure.frames]
+            frames = [named[f] for f in closure.frames]
             i, j = (int(f.parentJoint) for f in frames)
             sign = self.tree.support[j].astype(float) - self.tree.support[i].astype(float)
             self.anchored.append(

@@ -19,11 +19,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _springs
-from fivebar_pin._arrays import Array, Immutable, checked, numeric
+from fivebar_pin._arrays import Array, checked, numeric
 from fivebar_pin._manifold import Manifold, Point, manifold_of
 from fivebar_pin._mass import depth_first, mass_matrix
 from fivebar_pin._springs import JointSpring, Spring, SpringForces
-from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -34,7 +34,7 @@ _MASSLESS = 1e-13  # smallest to largest eigenvalue of the reduced inertia below
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mode(Immutable):
+class Mode:
     """What dry friction does.
 
     Attributes:
@@ -47,7 +47,7 @@ class Mode(Immutable):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equations(Immutable):
+class Equations:
     """Reduced equations of motion, inertia w = force and a = N w + held, over a batch.
 
     Attributes:
@@ -64,7 +64,7 @@ class Equations(Immutable):
 
 
 @dataclass(frozen=True, eq=False)
-class System(Immutable):
+class System:
     """A chain with its springs, ready to give accelerations.
 
     Attributes:
@@ -170,7 +170,8 @@ class System(Immutable):
     def _frames(self) -> list[tuple[int, int]]:
         """Frame numbers of every closure."""
         model = self.chain.model
-        found = [[find_frame(model, name) for name in c.frames] for c in self.chain.closures]
+        named = frames_by_name(model)
+        found = [[named[name] for name in c.frames] for c in self.chain.closures]
         return [(model.getFrameId(f.name, f.type), model.getFrameId(g.name, g.type)) for f, g in found]
 
     def _mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:

@@ -90,7 +90,7 @@ class Closure(Immutable):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FramePair(Immutable):
+class FramePair:
     """World poses of the two frames of a closure. R (..., 3, 3), p (..., 3)."""
 
     R1: Array

@@ -65,7 +65,7 @@ class Optimum(Immutable):
         )
 
 
-@finite()
+@finite(open=("bound_multipliers", "curvature", "multipliers"))
 def balance(
     linkage: FiveBar,
     *,
@@ -100,7 +100,7 @@ def balance(
     return _best(linkage, problem, only or starts, points, tolerance)
 
 
-@finite()
+@finite(open=("bound_multipliers", "curvature", "multipliers"))
 def balance_masses(
     linkage: FiveBar,
     *,
