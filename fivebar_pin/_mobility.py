@@ -21,6 +21,7 @@ from fivebar_pin.chain import ClosedChain
 _TRUNCATE = 1e-6  # singular values below this part of the largest are left out of a Newton step [-]
 _STARTS = 48  # random starts when no configuration is given
 _WALKERS, _STRIDES = 8, 2  # samples and steps of the walk that finds generic configurations
+_ENTRIES = 400_000  # numbers in the Jacobians of all of them at a time
 _STRIDE = 0.4  # length of its steps [rad, or chain lengths]
 _MANY = 2000  # combinations of joints beyond which only a good one is looked for
 
@@ -96,12 +97,17 @@ def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array
     best, residual = close(chain, neutral[None], tolerance)
     if closed_enough(loops, residual, tolerance)[0]:
         return best[0], float(gap(loops, best)[0])
-    rng = np.random.default_rng(seed)
-    tangent = rng.uniform(-np.pi, np.pi, (_STARTS, loops.tree.nv)) * loops.column_scale
-    q, sizes = close(chain, loops.tree.integrate(np.repeat(neutral[None], _STARTS, axis=0), tangent), tolerance)
+    rng, count = np.random.default_rng(seed), _affordable(_STARTS, loops)
+    tangent = rng.uniform(-np.pi, np.pi, (count, loops.tree.nv)) * loops.column_scale
+    q, sizes = close(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), tolerance)
     q, sizes = np.concatenate([best, q]), np.concatenate([residual, sizes])
     k = int(np.argmin(sizes))
     return q[k], float(gap(loops, q[k : k + 1])[0])
+
+
+def _affordable(count: int, loops: Loops) -> int:
+    """Return how many configurations to work on at a time: fewer where each takes a large matrix."""
+    return max(1, min(count, _ENTRIES // max(1, loops.m * loops.tree.nv)))
 
 
 def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) -> Site:
@@ -115,14 +121,15 @@ def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) ->
         return site
     rng = np.random.default_rng(seed)
     best, score = site, _score(loops, site)
-    here = [site] * _WALKERS
+    walkers = _affordable(_WALKERS, loops)
+    here = [site] * walkers
     for _ in range(_STRIDES):
         steps = [s.free @ rng.normal(size=s.free.shape[1]) for s in here]
         tangent = np.stack([_STRIDE * d / max(float(np.abs(d).max()), 1e-300) for d in steps]) * loops.column_scale
         start = loops.tree.integrate(np.stack([s.q for s in here]), tangent)
         q, residual = close(chain, start, tolerance)
         closed = closed_enough(loops, residual, tolerance)
-        here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(_WALKERS)]
+        here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(walkers)]
         for candidate in here:
             new = _score(loops, candidate)
             if candidate is not site and (new > score or (best is site and new[:2] == score[:2])):

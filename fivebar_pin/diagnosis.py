@@ -14,9 +14,9 @@ from fivebar_pin._diagnosis import ActuatedSet, Actuation, Diagnosis, Finding, R
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._mobility import Site
 from fivebar_pin._newton import closed_enough, residual_of
+from fivebar_pin._reactions import reactions
 from fivebar_pin._tracking import SINGULAR
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "diagnose"]
@@ -177,9 +177,9 @@ def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], n
     """Return which reaction components of joints and closures are not marked as open."""
     rest = np.zeros((1, chain.nv))
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
-    loads = inverse_dynamics(chain, still)
+    found = reactions(chain, still, rest, np.zeros((1, chain.na)), {}, ())
     out = []
-    for reaction in (loads.joint_reactions_local[0], loads.closure_reactions_local[0]):
+    for reaction in (found.joint_local[0], found.closure_local[0]):
         mask = np.isfinite(reaction)
         mask.setflags(write=False)
         out.append(mask)
