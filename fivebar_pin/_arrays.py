@@ -15,7 +15,8 @@ import numpy.typing as npt
 from fivebar_pin.errors import InvalidInputError
 
 Array = npt.NDArray[np.float64]
-T = TypeVar("T", bound="Immutable")
+V = TypeVar("V", bound="Immutable")
+T = TypeVar("T")
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -39,7 +40,7 @@ class Immutable:
         return _again, (type(self), {**state, **{name: dict(state[name]) for name in views}}, views)
 
 
-def _again(kind: type[T], state: dict[str, Any], views: list[str]) -> T:
+def _again(kind: type[V], state: dict[str, Any], views: list[str]) -> V:
     """Make a value again from its fields; those named as views become read-only views of their dictionaries."""
     value = kind.__new__(kind)
     for name, content in state.items():
@@ -179,6 +180,22 @@ def integer(name: str, value: object, *, least: int = 0) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
         raise InvalidInputError(name, value, f"must be an integer of at least {least}")
     return int(value)
+
+
+def all_of(name: str, given: object, kind: type[T]) -> tuple[T, ...]:
+    """Return things of one kind as a tuple; one name alone counts as a tuple of one.
+
+    Raises:
+        InvalidInputError: not iterable, or something of another kind in it.
+    """
+    try:
+        things: tuple[Any, ...] = (given,) if isinstance(given, str) else tuple(given)  # type: ignore[arg-type]
+    except TypeError as error:
+        raise InvalidInputError(name, given, f"must hold objects of type {kind.__name__}") from error
+    for thing in things:
+        if not isinstance(thing, kind):
+            raise InvalidInputError(name, thing, f"must hold objects of type {kind.__name__}")
+    return things
 
 
 def finite(*, open: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], Callable[P, R]]:

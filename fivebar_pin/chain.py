@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, Immutable, checked, frozen, seal
+from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -78,10 +78,11 @@ class ClosedChain(Immutable):
     visuals: tuple[Visual, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.model, pin.Model):
+            raise InvalidInputError("model", self.model, "must be a pin.Model; load(path) reads one from a file")
         object.__setattr__(self, "model", self.model.copy())
-        object.__setattr__(self, "closures", tuple(self.closures))
-        object.__setattr__(self, "actuated", tuple(self.actuated))
-        object.__setattr__(self, "visuals", tuple(self.visuals))
+        for name, kind in (("closures", Closure), ("actuated", str), ("visuals", Visual)):
+            object.__setattr__(self, name, all_of(name, getattr(self, name), kind))
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
         _check_tree(self.model)
         _check_closures(self.model, self.closures)
@@ -186,7 +187,7 @@ class ClosedChain(Immutable):
 
     def with_actuated(self, actuated: Iterable[str]) -> ClosedChain:
         """Return the same mechanism driven at other joints."""
-        return replace(self, actuated=tuple(actuated))
+        return replace(self, actuated=all_of("actuated", actuated, str))
 
 
 def frames_by_name(model: pin.Model) -> dict[str, pin.Frame]:

@@ -19,7 +19,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, checked, cross, frozen, skew
+from fivebar_pin._arrays import Array, Immutable, all_of, checked, cross, frozen, skew
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["Closure", "ClosureKind"]
@@ -65,8 +65,8 @@ class Closure(Immutable):
     name: str = ""
 
     def __post_init__(self) -> None:
-        frames = tuple(self.frames)
-        if isinstance(self.frames, str) or len(frames) != 2 or not all(isinstance(f, str) and f for f in frames):
+        frames = all_of("closure frames", self.frames, str)
+        if isinstance(self.frames, str) or len(frames) != 2 or not all(frames):
             raise InvalidInputError("closure frames", self.frames, "must be two frame names")
         object.__setattr__(self, "frames", frames)
         object.__setattr__(self, "kind", ClosureKind.parse(self.kind))
