@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import closures as rows
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, block_svd
 from fivebar_pin._once import once_per_chain
 from fivebar_pin._tree import Poses, Rates, Tree
 from fivebar_pin.chain import ClosedChain, frames_by_name
@@ -18,6 +18,7 @@ from fivebar_pin.closures import Closure, FramePair
 from fivebar_pin.errors import AssemblyError, InvalidInputError
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value of the scaled Jacobian [-]
+_WHOLE = 4000  # entries of a Jacobian from which on it is decomposed block by block
 _GENERIC_SAMPLES = 12
 
 
@@ -146,6 +147,11 @@ class Loops:
         return len(self._groups)
 
     @property
+    def independent(self) -> list[_Group]:
+        """The groups of closures that share no passive joint."""
+        return self._groups
+
+    @property
     def r(self) -> int:
         """Number of rows that are independent in general."""
         return int(self.reduce.shape[0])
@@ -245,7 +251,8 @@ class Loops:
         """Return the singular values of the scaled closure Jacobian, descending."""
         if 0 in J.shape:
             return np.zeros(0)
-        return np.asarray(np.linalg.svd(self.row_scale[:, None] * J * self.column_scale, compute_uv=False))
+        scaled = self.row_scale[:, None] * J * self.column_scale
+        return np.asarray(np.linalg.svd(scaled, compute_uv=False) if J.size < _WHOLE else block_svd(scaled)[1])
 
     def worst(self, residual: Array) -> tuple[str, float]:
         """Return the closure that one residual (m,) leaves open the most, and by how much."""
@@ -293,31 +300,34 @@ class Loops:
             passive_columns=np.searchsorted(columns, self.passive[passive]),
             actuated=actuated,
             actuated_columns=np.searchsorted(columns, self.actuated[actuated]),
-            reduce=self._independent_rows(closures, rows_),
+            reduce=self._independent_rows(closures, rows_, columns),
             scale=self.column_scale[self.passive[passive]],
         )
 
-    def _independent_rows(self, closures: list[_Anchored], rows_: npt.NDArray[np.intp]) -> Array:
+    def _independent_rows(
+        self, closures: list[_Anchored], rows_: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
+    ) -> Array:
         """Find the row combinations of some closures that are independent at generic configurations."""
-        poses = self._generic_poses
-        pairs = self.pairs(poses)
-        J = np.zeros((_GENERIC_SAMPLES, rows_.size, self.tree.nv))
+        poses, pairs = self._generic
+        J = np.zeros((_GENERIC_SAMPLES, rows_.size, columns.size))
         start = 0
         for c in closures:
             m = c.closure.kind.rows
-            J[:, start : start + m, c.moved] = _rows(c, poses, pairs)
+            J[:, start : start + m, np.searchsorted(columns, c.moved)] = _rows(c, poses, pairs)
             start += m
         scale = self.row_scale[rows_]
-        wide = np.concatenate(list(J * scale[:, None] * self.column_scale), axis=1)
+        wide = np.concatenate(list(J * scale[:, None] * self.column_scale[columns]), axis=1)
         U, s, _ = np.linalg.svd(wide, full_matrices=False)
         r = int(np.sum(s > RANK_TOLERANCE * max(s[0], 1e-300)))
         return np.diag(scale) if r == rows_.size else np.asarray(U[:, :r].T * scale)
 
     @cached_property
-    def _generic_poses(self) -> Poses:
+    def _generic(self) -> tuple[Poses, list[FramePair]]:
         rng = np.random.default_rng(7)
         tangent = rng.uniform(-np.pi, np.pi, (_GENERIC_SAMPLES, self.tree.nv)) * self.column_scale
-        return self.tree.poses(self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent))
+        q = self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent)
+        poses = self.tree.poses(q)
+        return poses, self.pairs(poses)
 
 
 @once_per_chain

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, block_svd
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._newton import closed_enough, residual_of, search
 from fivebar_pin.chain import ClosedChain
@@ -51,7 +51,7 @@ def site_at(loops: Loops, q: Array) -> Site:
     poses = loops.tree.poses(q[None])
     J = loops.jacobian(poses, loops.pairs(poses))[0]
     rank = loops.rank(J)
-    _, _, Vt = np.linalg.svd(loops.row_scale[:, None] * J * loops.column_scale, full_matrices=True)
+    _, _, Vt = block_svd(loops.row_scale[:, None] * J * loops.column_scale)
     return Site(q, J, rank, Vt[rank:].T)
 
 
@@ -77,8 +77,11 @@ def close(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]
         poses = loops.tree.poses(q)
         pairs = loops.pairs(poses)
         residual = loops.residual(pairs) * loops.row_scale
-        scaled = loops.row_scale[:, None] * loops.jacobian(poses, pairs) * loops.column_scale
-        step = -np.matmul(np.linalg.pinv(scaled, rcond=_TRUNCATE), residual[..., None])[..., 0]
+        step = np.zeros((q.shape[0], loops.tree.nv))
+        for g, block in zip(loops.independent, loops.blocks(poses, pairs), strict=True):
+            scaled = loops.row_scale[g.rows, None] * block * loops.column_scale[g.columns]
+            inverse = np.linalg.pinv(scaled, rcond=_TRUNCATE)
+            step[:, g.columns] = -np.matmul(inverse, residual[:, g.rows, None])[..., 0]
         step[good] = 0.0
         q = loops.tree.integrate(q, np.clip(step, -0.5, 0.5) * loops.column_scale)
     residual = gap(loops, q)
@@ -159,17 +162,17 @@ def redundant_combinations(loops: Loops, site: Site) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((0, 0))
     kept = loops.reduce / loops.row_scale  # orthonormal rows
     always = _complement_rows(kept, loops.m - loops.r)
-    U, _, _ = np.linalg.svd(loops.row_scale[:, None] * site.J * loops.column_scale, full_matrices=True)
+    U, _, _ = block_svd(loops.row_scale[:, None] * site.J * loops.column_scale)
     null = U[:, site.rank :].T
     extra = null.shape[0] - always.shape[0]
     outside = null - null @ always.T @ always
-    here = np.linalg.svd(outside, full_matrices=False)[2][: max(extra, 0)]
+    here = block_svd(outside)[2][:extra] if extra > 0 else np.zeros((0, null.shape[1]))
     return _echelon(always), _echelon(here)
 
 
 def _complement_rows(kept: Array, count: int) -> Array:
     m = kept.shape[1]
-    return np.linalg.svd(kept, full_matrices=True)[2][m - count :] if count else np.zeros((0, m))
+    return block_svd(kept)[2][m - count :] if count else np.zeros((0, m))
 
 
 def _echelon(rows: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _mobility, _plausible
-from fivebar_pin._arrays import Array, checked, frozen, integer
+from fivebar_pin._arrays import Array, block_svd, checked, frozen, integer
 from fivebar_pin._diagnosis import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._mobility import Site
@@ -154,7 +154,7 @@ def _actuation(chain: ClosedChain, site: Site) -> tuple[Actuation, tuple[str, ..
     undetermined: tuple[str, ...] = ()
     if free:
         scaled = (loops.row_scale[:, None] * Jp * loops.column_scale)[:, loops.passive]
-        null = np.linalg.svd(scaled, full_matrices=True)[2][loops.passive.size - free :] if loops.m else np.eye(free)
+        null = block_svd(scaled)[2][loops.passive.size - free :] if loops.m else np.eye(free)
         undetermined = _owners(chain, loops.passive[np.abs(null).max(axis=0) > _STILL])
     if not chain.na:
         return Actuation.NONE, undetermined, excess
@@ -169,7 +169,9 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
     if sigma == 0.0:
         return float("inf")
     scaled = loops.row_scale[:, None] * J * loops.column_scale
-    N = np.linalg.lstsq(scaled[:, loops.passive], -scaled[:, loops.actuated], rcond=None)[0]
+    U, s, Vt = block_svd(scaled[:, loops.passive])
+    k = s.size
+    N = Vt[:k].T @ ((U[:, :k].T @ scaled[:, loops.actuated]) / s[:, None])
     return float(np.abs(N).max())
 
 

@@ -30,6 +30,7 @@ __all__ = ["assemble", "assembly_modes", "closure_residual", "complement", "driv
 CLOSED = 1e-12  # closure residual that counts as closed [m or rad]
 _INDEPENDENT = 1e-7  # scaled closure rate at unit actuated speed above which the motors are in each other's way [-]
 _NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
+_MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once
 _BLOCK = 4096  # samples worked on at a time, so that intermediate arrays stay in cache
 
 
@@ -197,7 +198,7 @@ def closure_residual(chain: ClosedChain, q: npt.ArrayLike) -> Array:
 
 def _checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float) -> Loops:
     """Return the prepared loops once the numbers of a search have been looked at."""
-    integer("starts", starts, least=1)
+    integer("starts", starts, least=1, most=_MOST_STARTS)
     integer("seed", seed)
     number("tolerance", tolerance, positive=True)
     loops = loops_of(chain)

@@ -22,7 +22,7 @@ from fivebar_pin.errors import FiveBarPinError
 
 COUNT = int(os.environ.get("FIVEBAR_FUZZ", "150"))
 SEED = int(os.environ.get("FIVEBAR_FUZZ_SEED", "1"))
-LONGEST = 20  # time one input may take [s]
+LONGEST = 20  # time of the processor that one input may take [s]
 NUMBERS = (
     *(
         "0",
@@ -100,15 +100,15 @@ def watched() -> Iterator[None]:
     def late(*_: object) -> None:
         raise AssertionError(f"takes more than {LONGEST} s")
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(LONGEST)
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def attempt(make: Callable[[], object], what: str) -> object | None:

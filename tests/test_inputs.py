@@ -85,6 +85,8 @@ def test_a_count_is_a_whole_number(value):
     with pytest.raises(InvalidInputError, match=r"(?s)count = .* must be an integer of at least 0"):
         integer("count", value)
     assert integer("count", np.int16(3)) == 3
+    with pytest.raises(InvalidInputError, match="count = 'about 1e400' but must be at most 100"):
+        integer("count", 10**400, most=100)
 
 
 def test_the_callers_array_stays_his():

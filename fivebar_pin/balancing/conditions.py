@@ -33,6 +33,7 @@ __all__ = ["KINDS", "BalanceConditions", "balance_conditions"]
 
 KINDS = ("force", "moment", "dynamic", "static")
 _SMALL = 1e-6  # a singular value this far below the largest may be counted as zero [-]
+_MOST_SAMPLES = 1_000_000  # configurations; their rows are held in memory at once
 _CLEAR = 1e3  # ratio of neighbouring singular values that counts as a clear decision [-]
 _DOUBLINGS = 4  # how often the samples are doubled while the decision is not clear
 _ALIKE = 1e-9  # difference up to which directions [-], points, placements and configurations are the same [m, rad]
@@ -156,7 +157,8 @@ def balance_conditions(
     """
     if kind not in KINDS:
         raise UnknownNameError("kind of balance", kind, KINDS)
-    count = integer("samples", max(200, 20 * len(chain.joints)) if samples is None else samples, least=10)
+    wanted = max(200, 20 * len(chain.joints)) if samples is None else samples
+    count = integer("samples", wanted, least=10, most=_MOST_SAMPLES)
     point = checked("about", about, (3,))
     direction = _direction(chain, gravity) if kind == "static" else None
     drawn = random_samples(chain, int(count), near=near, seed=seed)

@@ -78,7 +78,7 @@ def pareto(
     check_terms((first, second), "objective")
     if first == second:
         raise InvalidInputError("objectives", (first, second), "must differ")
-    n = integer("n", n, least=2)
+    n = integer("n", n, least=2, most=10**8)
     problem = balance_problem(chain, kind, objectives=(first, second), **options)
     left, right = _end(problem, first, second), _end(problem, second, first)
     low, high = left.terms[first], right.terms[first]

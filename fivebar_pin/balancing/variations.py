@@ -30,7 +30,7 @@ def variations(chain: ClosedChain, count: int, *, spread: float = 0.2, seed: int
         spread: typical relative change s, between 0 and 0.9 [-].
         seed: of the draw.
     """
-    count = integer("count", count, least=1)
+    count = integer("count", count, least=1, most=10**8)
     if not 0.0 <= number("spread", spread) <= 0.9:
         raise InvalidInputError("spread", spread, "must lie between 0 and 0.9")
     rng = np.random.default_rng(integer("seed", seed))
