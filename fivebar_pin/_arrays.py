@@ -60,6 +60,7 @@ def seal(content: object) -> None:
         for item in content.values():
             seal(item)
 
+
 ROUND_OFF = 2.0**-40
 """Share of what adds up to a number that round-off may leave of it: 4096 units in the last place, as loops are closed
 to some hundred of them and a chain of solved equations adds to that [-]."""

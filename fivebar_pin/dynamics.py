@@ -25,7 +25,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _bodies
-from fivebar_pin._arrays import Array, checked, cross, figures, frozen, numeric, settled
+from fivebar_pin._arrays import Array, Immutable, checked, cross, figures, finite, frozen, numeric, settled
 from fivebar_pin._loops import loops_of
 from fivebar_pin._once import once_per_chain
 from fivebar_pin._reactions import Reactions, determinate, reactions

@@ -39,7 +39,7 @@ _SHELF = 8  # draws remembered for one chain
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class Samples(Immutable):
     """Closed, regular configurations.
 
     Attributes:

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, figures, frozen
+from fivebar_pin._arrays import Array, Immutable, figures, frozen
 from fivebar_pin.balancing._making import across, arm_width
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import reflected_inertia

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, figures, settled
+from fivebar_pin._arrays import Array, Immutable, figures, settled
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import Rows
 from fivebar_pin.balancing._terms import measure_of

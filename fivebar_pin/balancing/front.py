@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, figures, frozen
+from fivebar_pin._arrays import Array, Immutable, figures, frozen, integer
 from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._terms import check_terms
 from fivebar_pin.balancing.design import Design

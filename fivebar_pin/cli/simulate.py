@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fivebar_pin._arrays import figures
+from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._load import add_gravity, load_any
 from fivebar_pin.errors import InvalidInputError
