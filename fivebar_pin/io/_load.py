@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import checked
-from fivebar_pin.chain import ClosedChain, Visual, find_frame
+from fivebar_pin.chain import ClosedChain, Visual, frames_by_name
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
@@ -193,6 +193,7 @@ def make_chain(
 def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
     """Refuse closure frames that do not exist, are ambiguous (a link's name never is), or lie on one body."""
     frames: dict[str, list[pin.Frame]] = {}
+    named = frames_by_name(model) if closures else {}
     for frame in model.frames:
         frames.setdefault(frame.name, []).append(frame)
     for k, closure in enumerate(closures):
@@ -202,7 +203,7 @@ def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, 
             same = [f for f in frames[name] if f.type not in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)]
             if len(same) > 1:
                 raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
-        joints = [find_frame(model, name).parentJoint for name in closure.frames]
+        joints = [named[name].parentJoint for name in closure.frames]
         if joints[0] == joints[1]:
             body = model.names[joints[0]]
             raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")

@@ -83,7 +83,7 @@ class Solution(Immutable):
         turn = np.exp(1j * self.angles)
         b = self.linkage.lengths[:4] * turn
         gap = (b[:, 0] + b[:, 1] - self.linkage.lengths[4] - b[:, 3] - b[:, 2]) * turn[:, 1].conj()
-        return np.asarray(np.maximum(np.abs(gap.real), np.abs(gap.imag)))
+        return frozen(np.maximum(np.abs(gap.real), np.abs(gap.imag)))
 
     @cached_property
     @finite()
