@@ -543,5 +543,5 @@ def test_the_same_is_refused_in_mjcf(tmp_path: Path, word: str, message: str) ->
 def test_a_tag_that_does_not_fit_its_value_is_refused(tmp_path: Path, tag: str) -> None:
     (tmp_path / "r.urdf").write_text(LOSSES)
     (tmp_path / "r.yaml").write_text(SIDE + f"gravity: [0, 0, {tag}]\n")
-    with pytest.raises(FileFormatError, match="is not plain YAML|gravity"):
+    with pytest.raises(FileFormatError, match=r"is not plain YAML|gravity"):
         io.load(tmp_path / "r.urdf")
