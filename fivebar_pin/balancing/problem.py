@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen
 from fivebar_pin.balancing import _empty, _extent, _lift
 from fivebar_pin.balancing._given import Given
 from fivebar_pin.balancing._making import Maker, Sizes

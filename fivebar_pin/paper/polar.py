@@ -6,6 +6,7 @@ are 3 x 3 blocks, one per link.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -127,19 +128,21 @@ def climb(problem: Problem, start: Array) -> Stationary:
         x[free] = np.clip(z, problem.low[free], problem.high[free])
         return x
 
-    answer = minimize(
-        lambda z: problem.objective(whole(z)),
-        first[free],
-        jac=lambda z: problem.gradient(whole(z))[free],
-        bounds=list(zip(problem.low[free], problem.high[free], strict=True)),
-        constraints={
-            "type": "eq",
-            "fun": lambda z: problem.residual(whole(z)),
-            "jac": lambda z: problem.jacobian(whole(z))[:, free],
-        },
-        method="SLSQP",
-        options={"maxiter": 300, "ftol": 1e-13},
-    )
+    with warnings.catch_warnings():  # before 1.16 SciPy tells of bounds that it missed by round-off itself and mended
+        warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
+        answer = minimize(
+            lambda z: problem.objective(whole(z)),
+            first[free],
+            jac=lambda z: problem.gradient(whole(z))[free],
+            bounds=list(zip(problem.low[free], problem.high[free], strict=True)),
+            constraints={
+                "type": "eq",
+                "fun": lambda z: problem.residual(whole(z)),
+                "jac": lambda z: problem.jacobian(whole(z))[:, free],
+            },
+            method="SLSQP",
+            options={"maxiter": 300, "ftol": 1e-13},
+        )
     return _polish(problem, whole(np.asarray(answer.x)))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.bound import reach, stationary
 from fivebar_pin.balancing.solvers.cones import outside
 from fivebar_pin.balancing.solvers.program import Program

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.cones import CONES, outside, projected
 
 __all__ = ["Block", "Problem", "Program"]
