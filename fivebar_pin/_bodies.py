@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, cross
+from fivebar_pin._arrays import Array, Immutable, cross
 from fivebar_pin._tree import Poses, Rates, Tree
 from fivebar_pin.chain import ClosedChain
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bodies:
+class Bodies(Immutable):
     """Masses, mass centres and inertias of the moving bodies, one for each joint."""
 
     mass: Array  # (nb,)
@@ -35,7 +35,7 @@ class Bodies:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BodyRates:
+class BodyRates(Immutable):
     """Per sample and body.
 
     Attributes:

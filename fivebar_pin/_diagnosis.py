@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.errors import UnknownNameError
 
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -30,7 +30,7 @@ class Actuation(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(Immutable):
     """Something worth knowing.
 
     Attributes:
@@ -46,7 +46,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class RedundantRow:
+class RedundantRow(Immutable):
     """A closure row that the others imply.
 
     Attributes:
@@ -75,7 +75,7 @@ class RedundantRow:
 
 
 @dataclass(frozen=True, slots=True)
-class ActuatedSet:
+class ActuatedSet(Immutable):
     """Joints that would determine the motion.
 
     Attributes:
@@ -88,7 +88,7 @@ class ActuatedSet:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Diagnosis:
+class Diagnosis(Immutable):
     """What `diagnose` found. Print it, or ask its fields; "here" is the configuration q.
 
     Attributes:

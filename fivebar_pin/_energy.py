@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin import _bodies
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, numeric
 from fivebar_pin._springs import JointSpring, Spring
 from fivebar_pin._system import System, checked_wrench
 from fivebar_pin.chain import ClosedChain
@@ -17,7 +17,7 @@ from fivebar_pin.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EnergyBalance:
+class EnergyBalance(Immutable):
     """Energies [J] and powers [W] along a trajectory, n samples.
 
     Attributes:
@@ -64,6 +64,7 @@ class EnergyBalance:
         return float(mismatch.max() / max(float(self.exchanged.max()), 1e-300))
 
 
+@finite()
 def energy_balance(
     chain: ClosedChain,
     trajectory: Trajectory,
@@ -85,7 +86,7 @@ def energy_balance(
         Energies, their rate, and the powers supplied and dissipated.
     """
     system, n, v = System.of(chain, tuple(springs)), len(trajectory), trajectory.v
-    given = np.zeros(chain.na) if torque is None else np.asarray(torque, dtype=np.float64)
+    given = np.zeros(chain.na) if torque is None else numeric("torque", torque)
     tau = checked(
         "torque", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na)
     )

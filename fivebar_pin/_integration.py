@@ -25,6 +25,8 @@ from fivebar_pin.errors import SolverError
 from fivebar_pin.trajectory import Trajectory
 
 _RETRIES = 40
+_LOOK = 100  # steps after which the way done is looked at
+_NOWHERE = 1e-4  # share of the time that all the steps would cover at the present rate, below which they are not taken
 _CROSS = 2.0  # time to a singular instant, in usual steps, from which on one step over it is tried
 _STILL = 100  # shortest number of steps over the whole time while some joint sticks: what acts must be looked at
 _GAP = 0.467  # middle of the widest gap between the stages of DOP853, where a singular instant does least harm
@@ -45,9 +47,12 @@ def run(
     steps = _Steps(system, inputs, state, float(times[0]), float(times[-1]), rtol, atol)
     record = Record(system, times)
     record.put(0, steps.node.point, steps.node.v, steps.node.a)
-    for _ in range(max_steps):
+    step = 0
+    for step in range(max_steps):
         if record.done == times.size:
             return record.trajectory(state.rank)
+        if step % _LOOK == _LOOK - 1 and _hopeless(steps.node.t - times[0], times[-1] - times[0], step / max_steps):
+            break
         node = steps.node
         interpolant = steps.advance()
         record.fill(steps.motion, interpolant, node, steps.node)
@@ -55,9 +60,16 @@ def run(
         if progress is not None:
             progress((steps.node.t - float(times[0])) / float(times[-1] - times[0]))
     raise SolverError(
-        f"the simulation took {max_steps} steps to get to t = {steps.node.t:.6g} s of {times[-1]:.6g} s. The motion is "
-        "stiff or not smooth (very stiff springs, a torque with jumps): loosen rtol and atol, or raise max_steps."
+        f"the simulation took {step + 1} steps (of {max_steps}) to get to t = {steps.node.t:.6g} s of "
+        f"{times[-1]:.6g} s. "
+        "The motion is stiff or not smooth (very stiff springs, a torque with jumps): loosen rtol and "
+        "atol, or raise max_steps."
     )
+
+
+def _hopeless(done: float, whole: float, used: float) -> bool:
+    """Tell whether the steps left would hardly begin the way, judged by those used, as a share of all allowed."""
+    return bool(done < _NOWHERE * used * whole)
 
 
 class _Steps:

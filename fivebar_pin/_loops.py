@@ -10,14 +10,15 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import closures as rows
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, block_svd
 from fivebar_pin._once import once_per_chain
 from fivebar_pin._tree import Poses, Rates, Tree
-from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import Closure, FramePair
 from fivebar_pin.errors import AssemblyError, InvalidInputError
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value of the scaled Jacobian [-]
+_WHOLE = 4000  # entries of a Jacobian from which on it is decomposed block by block
 _GENERIC_SAMPLES = 12
 
 
@@ -109,9 +110,9 @@ class Loops:
         self.actuated, self.passive = chain.actuated_index, chain.passive_index
         self.length = chain.length
         self.anchored: list[_Anchored] = []
-        start = 0
+        start, named = 0, frames_by_name(model) if chain.closures else {}
         for closure in chain.closures:
-            frames = [find_frame(model, f) for f in closure.frames]
+            frames = [named[f] for f in closure.frames]
             i, j = (int(f.parentJoint) for f in frames)
             sign = self.tree.support[j].astype(float) - self.tree.support[i].astype(float)
             self.anchored.append(
@@ -144,6 +145,11 @@ class Loops:
     def groups(self) -> int:
         """Number of independent groups of closures."""
         return len(self._groups)
+
+    @property
+    def independent(self) -> list[_Group]:
+        """The groups of closures that share no passive joint."""
+        return self._groups
 
     @property
     def r(self) -> int:
@@ -245,7 +251,8 @@ class Loops:
         """Return the singular values of the scaled closure Jacobian, descending."""
         if 0 in J.shape:
             return np.zeros(0)
-        return np.asarray(np.linalg.svd(self.row_scale[:, None] * J * self.column_scale, compute_uv=False))
+        scaled = self.row_scale[:, None] * J * self.column_scale
+        return np.asarray(np.linalg.svd(scaled, compute_uv=False) if J.size < _WHOLE else block_svd(scaled)[1])
 
     def worst(self, residual: Array) -> tuple[str, float]:
         """Return the closure that one residual (m,) leaves open the most, and by how much."""
@@ -293,31 +300,34 @@ class Loops:
             passive_columns=np.searchsorted(columns, self.passive[passive]),
             actuated=actuated,
             actuated_columns=np.searchsorted(columns, self.actuated[actuated]),
-            reduce=self._independent_rows(closures, rows_),
+            reduce=self._independent_rows(closures, rows_, columns),
             scale=self.column_scale[self.passive[passive]],
         )
 
-    def _independent_rows(self, closures: list[_Anchored], rows_: npt.NDArray[np.intp]) -> Array:
+    def _independent_rows(
+        self, closures: list[_Anchored], rows_: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
+    ) -> Array:
         """Find the row combinations of some closures that are independent at generic configurations."""
-        poses = self._generic_poses
-        pairs = self.pairs(poses)
-        J = np.zeros((_GENERIC_SAMPLES, rows_.size, self.tree.nv))
+        poses, pairs = self._generic
+        J = np.zeros((_GENERIC_SAMPLES, rows_.size, columns.size))
         start = 0
         for c in closures:
             m = c.closure.kind.rows
-            J[:, start : start + m, c.moved] = _rows(c, poses, pairs)
+            J[:, start : start + m, np.searchsorted(columns, c.moved)] = _rows(c, poses, pairs)
             start += m
         scale = self.row_scale[rows_]
-        wide = np.concatenate(list(J * scale[:, None] * self.column_scale), axis=1)
+        wide = np.concatenate(list(J * scale[:, None] * self.column_scale[columns]), axis=1)
         U, s, _ = np.linalg.svd(wide, full_matrices=False)
         r = int(np.sum(s > RANK_TOLERANCE * max(s[0], 1e-300)))
         return np.diag(scale) if r == rows_.size else np.asarray(U[:, :r].T * scale)
 
     @cached_property
-    def _generic_poses(self) -> Poses:
+    def _generic(self) -> tuple[Poses, list[FramePair]]:
         rng = np.random.default_rng(7)
         tangent = rng.uniform(-np.pi, np.pi, (_GENERIC_SAMPLES, self.tree.nv)) * self.column_scale
-        return self.tree.poses(self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent))
+        q = self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent)
+        poses = self.tree.poses(q)
+        return poses, self.pairs(poses)
 
 
 @once_per_chain

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, block_svd
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._newton import closed_enough, residual_of, search
 from fivebar_pin.chain import ClosedChain
@@ -21,6 +21,7 @@ from fivebar_pin.chain import ClosedChain
 _TRUNCATE = 1e-6  # singular values below this part of the largest are left out of a Newton step [-]
 _STARTS = 48  # random starts when no configuration is given
 _WALKERS, _STRIDES = 8, 2  # samples and steps of the walk that finds generic configurations
+_ENTRIES = 400_000  # numbers in the Jacobians of all of them at a time
 _STRIDE = 0.4  # length of its steps [rad, or chain lengths]
 _MANY = 2000  # combinations of joints beyond which only a good one is looked for
 
@@ -50,7 +51,7 @@ def site_at(loops: Loops, q: Array) -> Site:
     poses = loops.tree.poses(q[None])
     J = loops.jacobian(poses, loops.pairs(poses))[0]
     rank = loops.rank(J)
-    _, _, Vt = np.linalg.svd(loops.row_scale[:, None] * J * loops.column_scale, full_matrices=True)
+    _, _, Vt = block_svd(loops.row_scale[:, None] * J * loops.column_scale)
     return Site(q, J, rank, Vt[rank:].T)
 
 
@@ -76,8 +77,11 @@ def close(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]
         poses = loops.tree.poses(q)
         pairs = loops.pairs(poses)
         residual = loops.residual(pairs) * loops.row_scale
-        scaled = loops.row_scale[:, None] * loops.jacobian(poses, pairs) * loops.column_scale
-        step = -np.matmul(np.linalg.pinv(scaled, rcond=_TRUNCATE), residual[..., None])[..., 0]
+        step = np.zeros((q.shape[0], loops.tree.nv))
+        for g, block in zip(loops.independent, loops.blocks(poses, pairs), strict=True):
+            scaled = loops.row_scale[g.rows, None] * block * loops.column_scale[g.columns]
+            inverse = np.linalg.pinv(scaled, rcond=_TRUNCATE)
+            step[:, g.columns] = -np.matmul(inverse, residual[:, g.rows, None])[..., 0]
         step[good] = 0.0
         q = loops.tree.integrate(q, np.clip(step, -0.5, 0.5) * loops.column_scale)
     residual = gap(loops, q)
@@ -96,12 +100,17 @@ def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array
     best, residual = close(chain, neutral[None], tolerance)
     if closed_enough(loops, residual, tolerance)[0]:
         return best[0], float(gap(loops, best)[0])
-    rng = np.random.default_rng(seed)
-    tangent = rng.uniform(-np.pi, np.pi, (_STARTS, loops.tree.nv)) * loops.column_scale
-    q, sizes = close(chain, loops.tree.integrate(np.repeat(neutral[None], _STARTS, axis=0), tangent), tolerance)
+    rng, count = np.random.default_rng(seed), _affordable(_STARTS, loops)
+    tangent = rng.uniform(-np.pi, np.pi, (count, loops.tree.nv)) * loops.column_scale
+    q, sizes = close(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), tolerance)
     q, sizes = np.concatenate([best, q]), np.concatenate([residual, sizes])
     k = int(np.argmin(sizes))
     return q[k], float(gap(loops, q[k : k + 1])[0])
+
+
+def _affordable(count: int, loops: Loops) -> int:
+    """Return how many configurations to work on at a time: fewer where each takes a large matrix."""
+    return max(1, min(count, _ENTRIES // max(1, loops.m * loops.tree.nv)))
 
 
 def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) -> Site:
@@ -115,14 +124,15 @@ def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) ->
         return site
     rng = np.random.default_rng(seed)
     best, score = site, _score(loops, site)
-    here = [site] * _WALKERS
+    walkers = _affordable(_WALKERS, loops)
+    here = [site] * walkers
     for _ in range(_STRIDES):
         steps = [s.free @ rng.normal(size=s.free.shape[1]) for s in here]
         tangent = np.stack([_STRIDE * d / max(float(np.abs(d).max()), 1e-300) for d in steps]) * loops.column_scale
         start = loops.tree.integrate(np.stack([s.q for s in here]), tangent)
         q, residual = close(chain, start, tolerance)
         closed = closed_enough(loops, residual, tolerance)
-        here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(_WALKERS)]
+        here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(walkers)]
         for candidate in here:
             new = _score(loops, candidate)
             if candidate is not site and (new > score or (best is site and new[:2] == score[:2])):
@@ -152,17 +162,17 @@ def redundant_combinations(loops: Loops, site: Site) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((0, 0))
     kept = loops.reduce / loops.row_scale  # orthonormal rows
     always = _complement_rows(kept, loops.m - loops.r)
-    U, _, _ = np.linalg.svd(loops.row_scale[:, None] * site.J * loops.column_scale, full_matrices=True)
+    U, _, _ = block_svd(loops.row_scale[:, None] * site.J * loops.column_scale)
     null = U[:, site.rank :].T
     extra = null.shape[0] - always.shape[0]
     outside = null - null @ always.T @ always
-    here = np.linalg.svd(outside, full_matrices=False)[2][: max(extra, 0)]
+    here = block_svd(outside)[2][:extra] if extra > 0 else np.zeros((0, null.shape[1]))
     return _echelon(always), _echelon(here)
 
 
 def _complement_rows(kept: Array, count: int) -> Array:
     m = kept.shape[1]
-    return np.linalg.svd(kept, full_matrices=True)[2][m - count :] if count else np.zeros((0, m))
+    return block_svd(kept)[2][m - count :] if count else np.zeros((0, m))
 
 
 def _echelon(rows: Array) -> Array:

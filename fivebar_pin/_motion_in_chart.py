@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, checked
+from fivebar_pin._arrays import Array, checked, numeric
 from fivebar_pin._manifold import Chart, Point
 from fivebar_pin._system import Mode, System, Wrench
 from fivebar_pin.errors import SingularityError, SolverError
@@ -195,4 +195,5 @@ def failure(node: Node, rank: int, reason: str) -> SingularityError | SolverErro
 
 def _value(name: str, given: Any, shape: tuple[int, ...], t: float, q: Array, v: Array) -> Array:
     """Return a constant or the value of a function of state, checked."""
-    return checked(name, given(t, q.copy(), v.copy()) if callable(given) else given, shape)
+    value = numeric(name, given(t, q.copy(), v.copy())) if callable(given) else given
+    return checked(name, value.reshape(1) if np.ndim(value) == 0 and shape == (1,) else value, shape)

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin._loops import loops_of
-from fivebar_pin._mass import depth_first, mass_matrix
+from fivebar_pin._mass import composite_mass_matrix
 from fivebar_pin._mobility import Site
 from fivebar_pin.chain import ClosedChain
 
@@ -70,8 +70,9 @@ def mass_problem(chain: ClosedChain, site: Site) -> str:
     model = chain.model
     if not site.free.shape[1]:
         return ""
-    M = mass_matrix(model, model.createData(), site.q, ordered=depth_first(model))
-    free = loops_of(chain).column_scale[:, None] * site.free
+    loops = loops_of(chain)
+    M = composite_mass_matrix(loops.tree, model, site.q)
+    free = loops.column_scale[:, None] * site.free
     values, vectors = np.linalg.eigh(free.T @ M @ free)
     if values[0] > _SINGULAR_MASS * max(float(np.abs(values).max()), 0.0):
         return ""

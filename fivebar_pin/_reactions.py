@@ -9,7 +9,7 @@ import numpy as np
 
 from fivebar_pin import _bodies
 from fivebar_pin import closures as rows
-from fivebar_pin._arrays import Array, cross, frozen
+from fivebar_pin._arrays import Array, Immutable, block_svd, cross, finite, frozen
 from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin._springs import JointSpring, Spring, body_wrenches
 from fivebar_pin._tree import Poses
@@ -20,7 +20,7 @@ _OPEN = 1e-9  # force in a joint for a unit force in the closures above which th
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reactions:
+class Reactions(Immutable):
     """Reactions along a trajectory, world axes.
 
     Attributes:
@@ -56,6 +56,7 @@ class Reactions:
     mismatch: float
 
 
+@finite(open=("closure", "closure_local", "joint", "joint_local"))
 def reactions(
     chain: ClosedChain,
     trajectory: Trajectory,
@@ -117,7 +118,8 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
         return _ClosureForces(np.zeros((n, 0)), none, none[:, None], none[..., :3], np.zeros((n, 0, 3, 3)), mismatch)
     pairs = loops.pairs(poses)
     J = loops.jacobian(poses, pairs)
-    U, s, Vt = np.linalg.svd(loops.row_scale[:, None] * J * loops.column_scale, full_matrices=True)
+    scaled = loops.row_scale[:, None] * J * loops.column_scale
+    U, s, Vt = [x[None] for x in block_svd(scaled[0])] if n == 1 else np.linalg.svd(scaled, full_matrices=True)
     rank = int(np.min(np.sum(s > RANK_TOLERANCE * np.maximum(s[:, :1], 1e-300), axis=1)))
     k = s.shape[1]
     inverse = np.where(np.arange(k) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, checked, cross
+from fivebar_pin._arrays import Array, Immutable, cross, number
 from fivebar_pin._loops import Loops
 from fivebar_pin._tree import Poses
 from fivebar_pin.chain import ClosedChain, find_frame
@@ -21,7 +21,7 @@ __all__ = ["JointSpring", "Spring"]
 
 
 @dataclass(frozen=True, slots=True)
-class Spring:
+class Spring(Immutable):
     """A spring with a damper beside it, between the origins of two frames.
 
     Attributes:
@@ -46,7 +46,7 @@ class Spring:
 
 
 @dataclass(frozen=True, slots=True)
-class JointSpring:
+class JointSpring(Immutable):
     """A spring with a damper beside it, on a joint of one degree of freedom.
 
     Attributes:
@@ -66,7 +66,7 @@ class JointSpring:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SpringForces:
+class SpringForces(Immutable):
     """What springs do at a batch of states.
 
     Attributes:
@@ -208,6 +208,6 @@ def _point(p: Array, J: Array) -> Array:
 
 def _check_numbers(name: str, stiffness: float, length: float, damping: float) -> None:
     for what, value in (("stiffness", stiffness), ("rest", length), ("damping", damping)):
-        checked(f"{what} of {name}", [value], (1,))
+        number(f"{what} of {name}", value)
         if what != "rest" and value < 0.0:
             raise InvalidInputError(f"{what} of {name}", value, "must be >= 0")

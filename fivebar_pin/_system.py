@@ -19,11 +19,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _springs
-from fivebar_pin._arrays import Array, checked
+from fivebar_pin._arrays import Array, checked, numeric
 from fivebar_pin._manifold import Manifold, Point, manifold_of
 from fivebar_pin._mass import depth_first, mass_matrix
 from fivebar_pin._springs import JointSpring, Spring, SpringForces
-from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -170,7 +170,8 @@ class System:
     def _frames(self) -> list[tuple[int, int]]:
         """Frame numbers of every closure."""
         model = self.chain.model
-        found = [[find_frame(model, name) for name in c.frames] for c in self.chain.closures]
+        named = frames_by_name(model)
+        found = [[named[name] for name in c.frames] for c in self.chain.closures]
         return [(model.getFrameId(f.name, f.type), model.getFrameId(g.name, g.type)) for f, g in found]
 
     def _mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -197,7 +198,7 @@ def checked_wrench(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] | N
     out = {}
     for name, wrench in (external or {}).items():
         check_frame(chain, name)
-        w = np.asarray(wrench, dtype=np.float64)
+        w = numeric(f"external[{name!r}]", wrench)
         out[name] = checked(f"external[{name!r}]", np.broadcast_to(w, (n, 6)) if w.shape == (6,) else w, (n, 6))
     return out
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array, cross
 
 _FEW = 6  # up to here one Pinocchio call per sample beats the batch
+_LARGE = 60  # velocity coordinates from which on pin.Data is not made: it holds tables of nv^3 (1.6 GB for 300)
 
 
 class _Kind(Enum):
@@ -75,7 +77,6 @@ class Tree:
     def __init__(self, model: pin.Model) -> None:
         self.nq, self.nv, self.njoints = int(model.nq), int(model.nv), int(model.njoints)
         self._model = model
-        self._data = model.createData()
         self.joints: list[_Joint | None] = [None, *(_read_joint(model, j) for j in range(1, self.njoints))]
         self._owner = [
             joint for joint in self.joints[1:] if joint is not None for _ in range(joint.v.stop - joint.v.start)
@@ -92,7 +93,7 @@ class Tree:
     def poses(self, q: Array) -> Poses:
         """Return the poses of all joints.  q (n, nq)."""
         n = q.shape[0]
-        if n <= _FEW:
+        if n <= _FEW and self.nv <= _LARGE:
             return self._poses_of_few(q)
         R: list[Array] = [np.broadcast_to(np.eye(3), (n, 3, 3))]
         p: list[Array] = [np.zeros((n, 3))]
@@ -101,6 +102,10 @@ class Tree:
             assert joint is not None
             _advance(joint, q, R, p, S)
         return Poses(R, p, S)
+
+    @cached_property
+    def _data(self) -> Any:
+        return self._model.createData()
 
     def _poses_of_few(self, q: Array) -> Poses:
         """The same through Pinocchio, which is faster for a handful of samples."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -20,7 +20,7 @@ _JOINT_FRAMES = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Visual:
+class Visual(Immutable):
     """A shape drawn on a frame of the tree; it has no mass.
 
     Attributes:
@@ -43,14 +43,19 @@ class Visual:
         lengths = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1, "mesh": 3}
         if self.shape not in lengths:
             raise UnknownNameError("visual shape", self.shape, lengths)
-        size = checked(f"size of {self.shape} on {self.frame}", self.size, (lengths[self.shape],))
+        name = f"size of {self.shape} on {self.frame}"
+        size = checked(name, self.size, (lengths[self.shape],))
+        if self.shape == "mesh" and not size.all():
+            raise InvalidInputError(name, size.tolist(), "must be scales other than zero")
+        if self.shape != "mesh" and size.min() < 0.0:
+            raise InvalidInputError(name, size.tolist(), "must not be negative [m]")
         object.__setattr__(self, "size", tuple(float(s) for s in size))
         object.__setattr__(self, "placement", checked("visual placement", self.placement, (4, 4)))
         object.__setattr__(self, "rgba", tuple(float(c) for c in checked("rgba", self.rgba, (4,))))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ClosedChain:
+class ClosedChain(Immutable):
     """An open tree, the closures that make loops of it, and the joints that are driven.
 
     Args:
@@ -73,18 +78,19 @@ class ClosedChain:
     visuals: tuple[Visual, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.model, pin.Model):
+            raise InvalidInputError("model", self.model, "must be a pin.Model; load(path) reads one from a file")
         object.__setattr__(self, "model", self.model.copy())
-        object.__setattr__(self, "closures", tuple(self.closures))
-        object.__setattr__(self, "actuated", tuple(self.actuated))
-        object.__setattr__(self, "visuals", tuple(self.visuals))
+        for name, kind in (("closures", Closure), ("actuated", str), ("visuals", Visual)):
+            object.__setattr__(self, name, all_of(name, getattr(self, name), kind))
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
         _check_tree(self.model)
         _check_closures(self.model, self.closures)
         _check_actuated(self.model, self.actuated)
-        frames = [f.name for f in self.model.frames]
+        frames = {f.name for f in self.model.frames} if self.visuals else set()
         for visual in self.visuals:
             if visual.frame not in frames:
-                raise UnknownNameError("frame", visual.frame, frames)
+                raise UnknownNameError("frame", visual.frame, sorted(frames))
 
     def __repr__(self) -> str:
         closures = ", ".join(f"{c.name} ({c.kind.value})" for c in self.closures) or "none"
@@ -122,12 +128,16 @@ class ClosedChain:
     def actuated_index(self) -> npt.NDArray[np.intp]:
         """Positions of the actuated coordinates in v (na,)."""
         model = self.model
-        return np.array([model.idx_vs[model.getJointId(j)] for j in self.actuated], dtype=np.intp)
+        index = np.array([model.idx_vs[model.getJointId(j)] for j in self.actuated], dtype=np.intp)
+        seal(index)
+        return index
 
     @cached_property
     def passive_index(self) -> npt.NDArray[np.intp]:
         """Positions of the passive coordinates in v (nv - na,)."""
-        return np.setdiff1d(np.arange(self.nv), self.actuated_index)
+        index = np.setdiff1d(np.arange(self.nv), self.actuated_index)
+        seal(index)
+        return index
 
     @cached_property
     def inertial_parameters(self) -> Array:
@@ -148,7 +158,8 @@ class ClosedChain:
         model = self.model
         spans, origin = [], np.array(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
         places = [(model.parents[j], model.jointPlacements[j].translation) for j in range(1, model.njoints)]
-        ends = [find_frame(model, f) for closure in self.closures for f in closure.frames]
+        frames = frames_by_name(model) if self.closures else {}
+        ends = [frames[f] for closure in self.closures for f in closure.frames]
         for parent, place in [*places, *((f.parentJoint, f.placement.translation) for f in ends)]:
             spans.append(float(np.linalg.norm(place - origin if parent == 0 else place)))
         real = [s for s in spans if s > 0.0]
@@ -176,11 +187,20 @@ class ClosedChain:
 
     def with_actuated(self, actuated: Iterable[str]) -> ClosedChain:
         """Return the same mechanism driven at other joints."""
-        return replace(self, actuated=tuple(actuated))
+        return replace(self, actuated=all_of("actuated", actuated, str))
+
+
+def frames_by_name(model: pin.Model) -> dict[str, pin.Frame]:
+    """Return every frame by its name; where a link and a joint share one (legal in URDF), the link's frame."""
+    found: dict[str, pin.Frame] = {}
+    for frame in model.frames:
+        if frame.name not in found or (found[frame.name].type in _JOINT_FRAMES and frame.type not in _JOINT_FRAMES):
+            found[frame.name] = frame
+    return found
 
 
 def find_frame(model: pin.Model, name: str) -> pin.Frame:
-    """Return the frame of this name; where a link and a joint share it (legal in URDF), the link's.
+    """Return the frame of this name, see `frames_by_name`, which is for many.
 
     Raises:
         UnknownNameError: there is none.
@@ -206,22 +226,73 @@ def _inertia(joint: str, pi: Array) -> pin.Inertia:
 def _check_tree(model: pin.Model) -> None:
     for j in range(1, model.njoints):
         placement, inertia = model.jointPlacements[j], model.inertias[j]
-        name = model.names[j]
         if not np.all(np.isfinite(placement.homogeneous)):
-            raise InvalidInputError(f"placement of joint {name}", "nan", "must be finite")
+            raise InvalidInputError(f"placement of joint {model.names[j]}", "nan", "must be finite")
         if not np.all(np.isfinite(inertia.toDynamicParameters())):
-            raise InvalidInputError(f"inertia of joint {name}", "nan", "must be finite")
+            raise InvalidInputError(f"inertia of joint {model.names[j]}", "nan", "must be finite")
         if inertia.mass < 0.0:
-            raise InvalidInputError(f"mass of the body of joint {name}", inertia.mass, "must not be negative [kg]")
+            raise InvalidInputError(
+                f"mass of the body of joint {model.names[j]}", inertia.mass, "must not be negative [kg]"
+            )
+    mimics = [model.names[j] for j in model.mimicking_joints]
+    if mimics:
+        raise InvalidInputError(
+            "mimic joints",
+            mimics,
+            "cannot be part of a chain: the bodies they move would be left out",
+            "Build the model without mimic: buildModelFromUrdf reads them as joints of their own.",
+        )
+    _check_losses(model)
+
+
+_LOSSES = {
+    "armature": "armature",
+    "damping": "damping",
+    "upperDryFrictionLimit": "dry friction",
+    "rotorInertia": "rotor inertia",
+    "upperEffortLimit": "effort limit",
+    "upperVelocityLimit": "velocity limit",
+}  # what must not be negative, by the field of pin.Model
+_LIMITS = (
+    ("lowerPositionLimit", "upperPositionLimit", "position limits"),
+    ("lowerEffortLimit", "upperEffortLimit", "effort limits"),
+    ("lowerVelocityLimit", "upperVelocityLimit", "velocity limits"),
+)
+
+
+def _check_losses(model: pin.Model) -> None:
+    """Raise for losses and limits that no joint can have; each check is one comparison for all joints."""
+    if not np.all(np.isfinite(model.gravity.linear)):
+        raise InvalidInputError("gravity", np.array(model.gravity.linear).tolist(), "must be finite [m/s2]")
+    for field_name, word in _LOSSES.items():
+        values = np.array(getattr(model, field_name))
+        bad = np.flatnonzero(~(values >= 0.0))
+        if bad.size:
+            k = int(bad[0])
+            name = _owner(model, k, "idx_vs")
+            raise InvalidInputError(f"{word} of joint {name}", float(values[k]), "must be a number, not negative")
+    for low_name, high_name, word in _LIMITS:
+        low, high = np.array(getattr(model, low_name)), np.array(getattr(model, high_name))
+        bad = np.flatnonzero(~(low <= high))
+        if bad.size:
+            k = int(bad[0])
+            name = _owner(model, k, "idx_qs" if word == "position limits" else "idx_vs")
+            raise InvalidInputError(f"{word} of joint {name}", [float(low[k]), float(high[k])], "must be lower, upper")
+
+
+def _owner(model: pin.Model, k: int, starts: str) -> str:
+    """Return the joint that coordinate k belongs to."""
+    first = list(getattr(model, starts))
+    return str(model.names[max(j for j in range(1, model.njoints) if first[j] <= k)])
 
 
 def _check_closures(model: pin.Model, closures: tuple[Closure, ...]) -> None:
-    frames = [f.name for f in model.frames]
+    frames = frames_by_name(model) if closures else {}
     for closure in closures:
         for frame in closure.frames:
             if frame not in frames:
                 raise UnknownNameError(f"frame of closure {closure.name}", frame, frames)
-        first, second = (find_frame(model, f).parentJoint for f in closure.frames)
+        first, second = (frames[f].parentJoint for f in closure.frames)
         if first == second:
             raise InvalidInputError(
                 f"closure {closure.name}",
@@ -234,12 +305,14 @@ def _check_closures(model: pin.Model, closures: tuple[Closure, ...]) -> None:
 
 
 def _check_actuated(model: pin.Model, actuated: tuple[str, ...]) -> None:
-    joints = list(model.names)[1:]
-    for k, name in enumerate(actuated):
-        if name not in joints:
-            raise UnknownNameError("actuated joint", name, joints)
-        if name in actuated[:k]:
-            raise InvalidInputError("actuated joints", actuated, f"{name!r} is named twice")
-        nv = model.joints[model.getJointId(name)].nv
+    places = {name: j for j, name in enumerate(model.names) if j}
+    for name in actuated:
+        if name not in places:
+            raise UnknownNameError("actuated joint", name, places)
+    if len(set(actuated)) < len(actuated):
+        name = next(name for name in actuated if actuated.count(name) > 1)
+        raise InvalidInputError("actuated joints", actuated, f"{name!r} is named twice")
+    for name in actuated:
+        nv = model.nvs[places[name]]
         if nv != 1:
             raise InvalidInputError(f"actuated joint {name}", f"nv = {nv}", "must have one degree of freedom")

@@ -19,7 +19,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, cross, frozen, skew
+from fivebar_pin._arrays import Array, Immutable, all_of, checked, cross, frozen, skew
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["Closure", "ClosureKind"]
@@ -49,7 +49,7 @@ class ClosureKind(str, Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Closure:
+class Closure(Immutable):
     """A loop closure between two frames of the open tree.
 
     Attributes:
@@ -65,16 +65,17 @@ class Closure:
     name: str = ""
 
     def __post_init__(self) -> None:
-        frames = tuple(self.frames)
-        if isinstance(self.frames, str) or len(frames) != 2 or not all(isinstance(f, str) and f for f in frames):
+        frames = all_of("closure frames", self.frames, str)
+        if isinstance(self.frames, str) or len(frames) != 2 or not all(frames):
             raise InvalidInputError("closure frames", self.frames, "must be two frame names")
         object.__setattr__(self, "frames", frames)
         object.__setattr__(self, "kind", ClosureKind.parse(self.kind))
         axis = checked("closure axis", self.axis, (3,))
-        length = float(np.linalg.norm(axis))
-        if length < 1e-9:
+        longest = float(np.abs(axis).max())
+        if longest < 1e-9:
             raise InvalidInputError("closure axis", axis.tolist(), "must not be zero")
-        object.__setattr__(self, "axis", frozen(axis / length))
+        axis = axis / longest if longest > 1e100 else axis  # the square of its length would overflow
+        object.__setattr__(self, "axis", frozen(axis / np.linalg.norm(axis)))
         object.__setattr__(self, "name", self.name or f"{frames[0]}~{frames[1]}")
 
     @property

@@ -9,14 +9,14 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _mobility, _plausible
-from fivebar_pin._arrays import Array, checked, frozen, integer
+from fivebar_pin._arrays import Array, block_svd, checked, frozen, integer
 from fivebar_pin._diagnosis import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._mobility import Site
 from fivebar_pin._newton import closed_enough, residual_of
+from fivebar_pin._reactions import reactions
 from fivebar_pin._tracking import SINGULAR
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "diagnose"]
@@ -44,6 +44,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     Raises:
         InvalidInputError: q of the wrong shape or not finite.
     """
+    integer("seed", seed)
     loops = loops_of(chain)
     findings: list[Finding] = []
     integer("seed", seed)
@@ -154,7 +155,7 @@ def _actuation(chain: ClosedChain, site: Site) -> tuple[Actuation, tuple[str, ..
     undetermined: tuple[str, ...] = ()
     if free:
         scaled = (loops.row_scale[:, None] * Jp * loops.column_scale)[:, loops.passive]
-        null = np.linalg.svd(scaled, full_matrices=True)[2][loops.passive.size - free :] if loops.m else np.eye(free)
+        null = block_svd(scaled)[2][loops.passive.size - free :] if loops.m else np.eye(free)
         undetermined = _owners(chain, loops.passive[np.abs(null).max(axis=0) > _STILL])
     if not chain.na:
         return Actuation.NONE, undetermined, excess
@@ -169,7 +170,9 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
     if sigma == 0.0:
         return float("inf")
     scaled = loops.row_scale[:, None] * J * loops.column_scale
-    N = np.linalg.lstsq(scaled[:, loops.passive], -scaled[:, loops.actuated], rcond=None)[0]
+    U, s, Vt = block_svd(scaled[:, loops.passive])
+    k = s.size
+    N = Vt[:k].T @ ((U[:, :k].T @ scaled[:, loops.actuated]) / s[:, None])
     return float(np.abs(N).max())
 
 
@@ -177,9 +180,9 @@ def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], n
     """Return which reaction components of joints and closures are not marked as open."""
     rest = np.zeros((1, chain.nv))
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
-    loads = inverse_dynamics(chain, still)
+    found = reactions(chain, still, rest, np.zeros((1, chain.na)), {}, ())
     out = []
-    for reaction in (loads.joint_reactions_local[0], loads.closure_reactions_local[0]):
+    for reaction in (found.joint_local[0], found.closure_local[0]):
         mask = np.isfinite(reaction)
         mask.setflags(write=False)
         out.append(mask)

@@ -25,7 +25,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin import _bodies
-from fivebar_pin._arrays import Array, checked, cross, figures, frozen, numeric, settled
+from fivebar_pin._arrays import Array, Immutable, checked, cross, figures, finite, frozen, numeric, settled
 from fivebar_pin._loops import loops_of
 from fivebar_pin._once import once_per_chain
 from fivebar_pin._reactions import Reactions, determinate, reactions
@@ -40,7 +40,7 @@ _SAMPLES_PER_THREAD = 4096
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Loads:
+class Loads(Immutable):
     """Forces and torques along a trajectory. World axes; n samples.
 
     Attributes:
@@ -82,6 +82,7 @@ class Loads:
         return bool(heavy or any(w.any() for w in self.external.values()))
 
     @cached_property
+    @finite()
     def com(self) -> Array:
         """Centre of mass of all moving bodies (n, 3) [m]."""
         loops = loops_of(self.chain)
@@ -136,12 +137,14 @@ class Loads:
         return frozen(0.5 * np.sum(np.array(self.chain.model.armature) * self.trajectory.v**2, axis=1))
 
     @cached_property
+    @finite()
     def potential_energy(self) -> Array:
         """Potential energy of gravity, zero at the world origin (n,) [J]."""
         gravity = np.array(self.chain.model.gravity.linear)
         return frozen(-self.chain.mass * self.com @ gravity)
 
     @cached_property
+    @finite()
     def elastic_energy(self) -> Array:
         """Energy stored in the springs (n,) [J]."""
         return frozen(self._sprung.energy)
@@ -244,6 +247,7 @@ class Loads:
         return mismatch / max(sum(float(np.abs(x[..., :3]).max(initial=0.0)) for x in sizes), 1e-300)
 
 
+@finite(open=("N", "torque"))
 def inverse_dynamics(
     chain: ClosedChain,
     trajectory: Trajectory,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import pickle
 from collections.abc import Iterable
 from itertools import islice
+from typing import Any
 
 __all__ = [
     "AssemblyError",
@@ -29,10 +31,34 @@ _MOST_NAMES = 40
 
 
 class FiveBarPinError(Exception):
-    """Base of all errors raised on purpose by this library. No message is longer than a terminal can show."""
+    """Base of all errors raised on purpose by this library. No message is longer than a terminal can show.
+
+    Every error of the family travels between processes whole: message and evidence. Python would call the class
+    again with the message alone, which most of them do not take, and a pool whose worker raised one would hang.
+    """
 
     def __init__(self, *args: object) -> None:
         super().__init__(*(_cut(x, _MOST_CHARACTERS) if isinstance(x, str) else x for x in args))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (type(self), self.args, {name: _portable(value) for name, value in vars(self).items()})
+
+
+def _again(kind: type[FiveBarPinError], args: tuple[object, ...], evidence: dict[str, Any]) -> FiveBarPinError:
+    """Make an error of another process again, without asking its class how it is made."""
+    error = kind.__new__(kind, *args)
+    error.args = args
+    vars(error).update(evidence)
+    return error
+
+
+def _portable(value: object) -> object:
+    """Return the value, or how it is written when it cannot travel itself (a lock, an open file, a generator)."""
+    try:
+        pickle.loads(pickle.dumps(value))
+    except Exception:  # whatever a stranger's object raises there, the error that carries it must arrive
+        return repr(value)
+    return value
 
 
 class InvalidInputError(FiveBarPinError, ValueError):

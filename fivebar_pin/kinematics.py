@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, integer, numeric
+from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin._loops import Loops, PassiveMap, loops_of, open_message
 from fivebar_pin._newton import closed_enough, polish, residual_of, search
 from fivebar_pin._tracking import SINGULAR, follow, node_at, track
@@ -30,9 +30,11 @@ __all__ = ["assemble", "assembly_modes", "closure_residual", "complement", "driv
 CLOSED = 1e-12  # closure residual that counts as closed [m or rad]
 _INDEPENDENT = 1e-7  # scaled closure rate at unit actuated speed above which the motors are in each other's way [-]
 _NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
+_MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once
 _BLOCK = 4096  # samples worked on at a time, so that intermediate arrays stay in cache
 
 
+@finite()
 def assemble(
     chain: ClosedChain,
     q_actuated: npt.ArrayLike,
@@ -61,10 +63,7 @@ def assemble(
         AssemblyError: the loops do not close; names the closure that stays open and by how much.
         SingularityError: the way from `near` is blocked by a singularity.
     """
-    loops = loops_of(chain)
-    loops.require_determined()
-    integer("starts", starts, least=1)
-    integer("seed", seed)
+    loops = _checked_search(chain, starts, seed, tolerance)
     x = numeric("q_actuated", q_actuated)
     if x.ndim == 2:
         each = [assemble(chain, row, near, starts=starts, seed=seed, tolerance=tolerance) for row in x]
@@ -81,6 +80,7 @@ def assemble(
     return np.asarray(q[0])
 
 
+@finite()
 def assembly_modes(
     chain: ClosedChain,
     q_actuated: npt.ArrayLike,
@@ -96,10 +96,7 @@ def assembly_modes(
     Returns:
         Configurations (k, nq), ordered by their coordinates; a five-bar has two. Empty when nothing closes.
     """
-    loops = loops_of(chain)
-    loops.require_determined()
-    integer("starts", starts, least=1)
-    integer("seed", seed)
+    loops = _checked_search(chain, starts, seed, tolerance)
     x = checked("q_actuated", q_actuated, (chain.na,))
     q, _ = _closed_from_starts(chain, loops, x, starts, seed, tolerance)
     modes: list[Array] = []
@@ -111,6 +108,7 @@ def assembly_modes(
     return np.stack(modes) if modes else np.zeros((0, chain.nq))
 
 
+@finite()
 def drive(
     chain: ClosedChain,
     motion: Motion,
@@ -158,6 +156,7 @@ def drive(
     return Trajectory(motion.t, closed.q, v, a, N, closed.residual)
 
 
+@finite()
 def complement(chain: ClosedChain, q: npt.ArrayLike) -> Array:
     """Return the complement N of the closure Jacobian: v = N v_actuated and J N = 0.
 
@@ -173,8 +172,9 @@ def complement(chain: ClosedChain, q: npt.ArrayLike) -> Array:
     """
     loops = loops_of(chain)
     loops.require_determined()
-    Q = checked("q", np.atleast_2d(numeric("q", q)), (None, chain.nq))
-    single = np.ndim(q) == 1
+    Q = numeric("q", q)
+    single = Q.ndim == 1
+    Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
     poses = loops.tree.poses(Q)
     blocks = loops.blocks(poses, loops.pairs(poses))
     passive = loops.passive_map(blocks)
@@ -183,15 +183,27 @@ def complement(chain: ClosedChain, q: npt.ArrayLike) -> Array:
     return np.asarray(N[0]) if single else N
 
 
+@finite()
 def closure_residual(chain: ClosedChain, q: npt.ArrayLike) -> Array:
     """Return every closure row at q: (nq,) -> (m,) or (n, nq) -> (n, m) [m, rad], axes of frame 1."""
     loops = loops_of(chain)
-    Q = checked("q", np.atleast_2d(numeric("q", q)), (None, chain.nq))
-    single = np.ndim(q) == 1
+    Q = numeric("q", q)
+    single = Q.ndim == 1
+    Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
     if not loops.m:
         return np.zeros((0,) if single else (Q.shape[0], 0))
     residual = residual_of(loops, Q)
     return np.asarray(residual[0]) if single else residual
+
+
+def _checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float) -> Loops:
+    """Return the prepared loops once the numbers of a search have been looked at."""
+    integer("starts", starts, least=1, most=_MOST_STARTS)
+    integer("seed", seed)
+    number("tolerance", tolerance, positive=True)
+    loops = loops_of(chain)
+    loops.require_determined()
+    return loops
 
 
 def _consistent(loops: Loops, q: Array, va: Array, aa: Array) -> tuple[Array, Array, Array]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, number, numeric, table_text
+from fivebar_pin._arrays import Array, Immutable, checked, finite, number, numeric, table_text
 from fivebar_pin._files import as_path, check_new, read_bounded, write_file
 from fivebar_pin.errors import FileFormatError, InvalidInputError
 
@@ -29,7 +30,7 @@ _MAX_TABLE_BYTES = 256 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class Motion(Immutable):
     """Sampled motion of the actuated coordinates.
 
     Attributes:
@@ -69,6 +70,7 @@ class Motion:
         """Number of actuated coordinates."""
         return int(self.q.shape[1])
 
+    @finite()
     def scaled(self, speed: float) -> Motion:
         """Return the same path run `speed` times as fast."""
         k = number("speed", speed, positive=True)
@@ -93,6 +95,7 @@ def constant(t: npt.ArrayLike, value: float) -> Motion:
     return _column(time, zero + number("value", value), zero, zero)
 
 
+@finite()
 def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | None = None) -> Motion:
     """Move from start to stop along a cycloid: q = start + h (s - sin(2 pi s) / 2 pi), s = (t - t_0) / duration.
 
@@ -114,6 +117,7 @@ def cycloidal(t: npt.ArrayLike, start: float, stop: float, *, duration: float | 
     )
 
 
+@finite()
 def harmonic(t: npt.ArrayLike, mean: float, amplitude: float, *, period: float, phase: float = 0.0) -> Motion:
     """Swing about a mean: q = mean + amplitude cos(2 pi t / period + phase)."""
     time = checked("t", t, (None,))
@@ -122,6 +126,7 @@ def harmonic(t: npt.ArrayLike, mean: float, amplitude: float, *, period: float, 
     return _column(time, centre + h * np.cos(x), -h * w * np.sin(x), -h * w**2 * np.cos(x))
 
 
+@finite()
 def polynomial(
     t: npt.ArrayLike, start: float, stop: float, *, degree: int = 5, duration: float | None = None
 ) -> Motion:
@@ -145,6 +150,7 @@ def polynomial(
     return _column(time, low + h * p(s), moving * h / T * p.deriv()(s), moving * h / T**2 * p.deriv(2)(s))
 
 
+@finite()
 def spline(t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, periodic: bool = False) -> Motion:
     """Pass through given values with a quintic spline (continuous to the fourth derivative).
 
@@ -171,10 +177,22 @@ def spline(t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, per
     return Motion(time, curve(time), curve.derivative(1)(time), curve.derivative(2)(time))
 
 
-def from_file(path: str | Path) -> Motion:
-    """Read a motion from a csv file with the columns t, q_*, v_*, a_* (one of each per actuated coordinate).
+def from_file(path: str | Path, names: Sequence[str] | None = None) -> Motion:
+    """Read a motion from a csv file with one row per sample.
 
-    The part after q_, v_, a_ is free but must agree; the order is that of the q columns.
+    The columns are t, q_*, v_*, a_* as `to_file` writes them, or those of our own tables of results, with their units:
+    t [s], q crank [rad], v crank [rad/s], a crank [rad/s2], or crank [rad], dcrank [rad/s], ddcrank [rad/s2]. Where
+    there are positions but no velocities and no accelerations, these come from a quintic spline through the positions
+    (`spline`), which needs at least six samples.
+
+    Args:
+        path: the file.
+        names: actuated joints whose columns are wanted, in this order; then the file may hold others too. Without
+            names, or where the file has as many coordinates and knows none of these names, all are taken as they come.
+
+    Raises:
+        FileFormatError: not a table of numbers, columns missing or of another unit; names them.
+        InvalidInputError: values that are not finite, times that do not increase, too few samples for a spline.
     """
     import csv
     import io
@@ -185,17 +203,69 @@ def from_file(path: str | Path) -> Motion:
         lines = [line for line in csv.reader(io.StringIO(text, newline="")) if line]
     except (UnicodeDecodeError, csv.Error) as error:
         raise FileFormatError(file, f"cannot be read as a motion table ({error})") from error
-    names = [name.strip() for name in lines[0]] if lines else []
-    columns = [name[2:] for name in names if name.startswith("q_")]
-    wanted = ["t"] + [f"{x}_{c}" for x in "qva" for c in columns]
-    missing = [name for name in wanted if name not in names]
-    if missing or not columns:
-        raise FileFormatError(file, f"needs the columns t, q_*, v_*, a_*; missing {', '.join(missing) or 'q_*'}")
-    if len(set(names)) < len(names):
-        raise FileFormatError(file, f"has two columns of one name among {', '.join(names)}")
-    table = np.array([_numbers(file, k + 2, line, len(names)) for k, line in enumerate(lines[1:])])
-    column = dict(zip(names, table.reshape(-1, len(names)).T, strict=True))
-    return Motion(column["t"], *(np.stack([column[f"{x}_{c}"] for c in columns], axis=1) for x in "qva"))
+    head = [name.strip() for name in lines[0]] if lines else []
+    if len(set(head)) < len(head):
+        raise FileFormatError(file, f"has two columns of one name among {', '.join(head)}")
+    wanted = _wanted(file, _columns(file, head), names)
+    table = np.array([_numbers(file, k + 2, line, len(head)) for k, line in enumerate(lines[1:])])
+    table = table.reshape(-1, len(head))
+    t, q, v, a = (table[:, [head.index(name) for name in wanted[x]]] for x in "tqva")
+    return Motion(t[:, 0], q, v, a) if wanted["v"] else spline(t[:, 0], t[:, 0], q)
+
+
+_UNITS = {"t": ("s",), "q": ("rad", "m", "-"), "v": ("rad/s", "m/s"), "a": ("rad/s2", "m/s2", "rad/s^2", "m/s^2")}
+Columns = dict[str, dict[str, str]]
+
+
+def _columns(file: Path, head: list[str]) -> Columns:
+    """Return what the columns hold: for t, q, v, a the heading of every coordinate by its name.
+
+    Raises:
+        FileFormatError: a unit that is not ours; numbers are not converted.
+    """
+    found: Columns = {x: {} for x in "tqva"}
+    bare = {(name.split("[")[0].strip() if name.endswith("]") else name): name for name in head}
+    for name, heading in bare.items():
+        if name == "t":
+            found["t"][""] = heading
+        elif name[:2] in ("q_", "q ", "v_", "v ", "a_", "a "):
+            found[name[0]][name[2:]] = heading
+        elif f"d{name}" in bare and f"dd{name}" in bare:
+            for x, prefix in (("q", ""), ("v", "d"), ("a", "dd")):
+                found[x][name] = bare[prefix + name]
+    for x, headings in found.items():
+        for heading in headings.values():
+            unit = heading.partition("[")[2].rstrip("]").strip()
+            if unit and unit not in _UNITS[x]:
+                known = " or ".join(_UNITS[x])
+                raise FileFormatError(file, f"has the column {heading!r}; its unit must be {known}, convert it first")
+    return found
+
+
+def _wanted(file: Path, found: Columns, names: Sequence[str] | None) -> dict[str, list[str]]:
+    """Return the headings to read for t, q, v, a; none for v and a where there are neither.
+
+    Raises:
+        FileFormatError: columns are missing; names them.
+    """
+    chosen = list(found["q"])
+    if names is not None and (set(names) & set(chosen) or len(names) != len(chosen)):
+        chosen = list(names)
+    rates = "va" if any(name in found[x] for x in "va" for name in chosen) else ""
+    missing = [] if found["t"] else ["t"]
+    missing += [f"{x}_{name}" for x in "q" + rates for name in chosen if name not in found[x]]
+    if missing or not chosen:
+        there = ", ".join(found["q"]) or "none"
+        raise FileFormatError(
+            file,
+            f"needs the columns t, q_*, v_*, a_* (or t, q_* alone); missing {', '.join(missing) or 'q_*'}; "
+            f"coordinates there: {there}",
+        )
+    return {
+        "t": [found["t"][""]],
+        "q": [found["q"][name] for name in chosen],
+        **{x: [found[x][name] for name in chosen] if rates else [] for x in "va"},
+    }
 
 
 def to_file(motion: Motion, path: str | Path, names: tuple[str, ...], *, overwrite: bool = False) -> None:

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, integer
+from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin._energy import EnergyBalance, energy_balance
 from fivebar_pin._integration import run
 from fivebar_pin._manifold import Point
@@ -31,11 +31,12 @@ Torque = npt.ArrayLike | Callable[[float, Array, Array], npt.ArrayLike] | None
 _CLOSED = 1e-8  # closure residual and velocity mismatch that a given state may have [-]
 
 
+@finite()
 def forward_dynamics(
     chain: ClosedChain,
     q: npt.ArrayLike,
     v: npt.ArrayLike,
-    tau: npt.ArrayLike | None,
+    tau: npt.ArrayLike | None = None,
     *,
     external: Mapping[str, npt.ArrayLike] | None = None,
     springs: Iterable[Spring | JointSpring] = (),
@@ -50,7 +51,8 @@ def forward_dynamics(
         chain: the mechanism.
         q: closed configuration (nq,) or (n, nq).
         v: velocity that keeps it closed (nv,) or (n, nv).
-        tau: torque of the actuated joints (na,) or (n, na) [N m or N]; None for no torque.
+        tau: torque of the actuated joints (na,) or (n, na), one number where there is one motor [N m or N]; no torque
+            unless given.
         external: forces from outside: frame name -> wrench (6,) or (n, 6), force [N] and moment [N m] in world axes at
             the frame's origin.
         springs: springs and dampers.
@@ -63,13 +65,14 @@ def forward_dynamics(
         SingularityError: q is a bifurcation, where the motion is not determined.
     """
     system = System.of(chain, tuple(springs))
-    single = np.ndim(q) == 1
-    Q = checked("q", np.atleast_2d(np.asarray(q, dtype=np.float64)), (None, chain.nq))
+    Q = numeric("q", q)
+    single = Q.ndim == 1
+    Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
     n = Q.shape[0]
-    V = checked("v", np.atleast_2d(np.asarray(v, dtype=np.float64)), (n, chain.nv))
+    V = checked("v", np.atleast_2d(numeric("v", v)), (n, chain.nv))
     if not n:
         return np.zeros((0, chain.nv))
-    given = np.zeros(chain.na) if tau is None else np.asarray(tau, dtype=np.float64)
+    given = _torque(chain, tau)
     T = checked("tau", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na))
     point = system.manifold.at(Q)
     _require_consistent(system, point, V)
@@ -79,12 +82,13 @@ def forward_dynamics(
     return np.asarray(a[0]) if single else a
 
 
+@finite(open=("N",))
 def simulate(
     chain: ClosedChain,
     q: npt.ArrayLike,
     v: npt.ArrayLike,
-    tau: Torque,
-    t: npt.ArrayLike,
+    tau: Torque = None,
+    t: npt.ArrayLike | None = None,
     *,
     springs: Iterable[Spring | JointSpring] = (),
     external: Mapping[str, Wrench] | None = None,
@@ -103,8 +107,9 @@ def simulate(
         chain: the mechanism, with any number of motors.
         q: configuration at t[0] (nq,).
         v: velocity at t[0] (nv,).
-        tau: torque of the actuated joints: None, constant (na,), or a function (t, q, v) -> (na,) [N m or N].
-        t: increasing output times (n,) [s].
+        tau: torque of the actuated joints: constant (na,), one number where there is one motor, or a function
+            (t, q, v) of either [N m or N]; no torque unless given.
+        t: increasing output times (n,) [s]; always needed.
         springs: springs and dampers.
         external: forces from outside: frame name -> wrench (6,) or a function (t, q, v) -> (6,), force [N] and moment
             [N m] in world axes at the frame's origin.
@@ -125,21 +130,30 @@ def simulate(
         SingularityError: the motion meets a bifurcation that it cannot be followed through.
         SolverError: the integrator fails.
     """
+    if t is None:
+        raise InvalidInputError("t", t, "must be the output times [s]", "Without a torque: simulate(chain, q, v, t=t).")
     times = checked("t", t, (None,))
     if times.size < 1 or np.any(np.diff(times) <= 0.0):
         raise InvalidInputError("t", times.tolist()[:5], "must hold one or more increasing times")
     for name, value in (("rtol", rtol), ("atol", atol)):
-        if not 0.0 < value < 1.0:
+        if not 0.0 < number(name, value) < 1.0:
             raise InvalidInputError(name, value, "must lie between 0 and 1")
     integer("max_steps", max_steps, least=1)
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
+    integer("max_steps", max_steps, least=1)
     system = System.of(chain, tuple(springs))
     for frame in external or {}:
         check_frame(chain, frame)
     state = _initial_state(system, checked("q", q, (chain.nq,)), checked("v", v, (chain.nv,)), initial)
-    inputs = Inputs(tau if tau is not None else np.zeros(chain.na), dict(external or {}))
+    inputs = Inputs(tau if callable(tau) else _torque(chain, tau), dict(external or {}))
     return run(system, inputs, state, times, rtol=rtol, atol=atol, max_steps=max_steps, progress=progress)
+
+
+def _torque(chain: ClosedChain, tau: npt.ArrayLike | None) -> Array:
+    """Return a constant torque as an array: zeros where none is given, one number as that of the only motor."""
+    given = np.zeros(chain.na) if tau is None else numeric("tau", tau)
+    return given.reshape(1) if given.ndim == 0 and chain.na == 1 else given
 
 
 def _initial_state(system: System, q: Array, v: Array, initial: str) -> State:

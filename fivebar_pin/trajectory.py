@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 
@@ -14,7 +14,7 @@ __all__ = ["Trajectory"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
+class Trajectory(Immutable):
     """Consistent motion of all coordinates of a closed chain.
 
     Attributes:
@@ -36,8 +36,8 @@ class Trajectory:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
-            if value.flags.writeable:
-                object.__setattr__(self, name, frozen(value))
+            if not isinstance(value, np.ndarray) or value.dtype != np.float64 or value.flags.writeable:
+                object.__setattr__(self, name, numeric(f"trajectory.{name}", value))
 
     def __len__(self) -> int:
         return int(self.t.size)

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pinocchio as pin
 import pytest
-from mechanisms import AT_ORIGIN, add, at, body, double_four_bar, five_bar, point, rscr, slider_crank
+from mechanisms import AT_ORIGIN, add, at, body, double_four_bar, five_bar, four_bar, point, rscr, slider_crank
 
 import fivebar_pin as fb
 from fivebar_pin.chain import Visual, find_frame
@@ -185,3 +185,62 @@ def test_a_link_wins_over_a_fixed_joint_of_its_name():
     model.addFrame(pin.Frame("tip", one, 0, pin.SE3.Identity(), pin.FrameType.FIXED_JOINT), False)
     model.addFrame(pin.Frame("tip", one, 0, out, pin.FrameType.BODY), False)
     np.testing.assert_array_equal(find_frame(model, "tip").placement.translation, [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("damping", -0.1, "damping of joint coupler = -0.1 but must be a number, not negative"),
+        ("upperDryFrictionLimit", -1e-9, "dry friction of joint coupler"),
+        ("armature", -1.0, "armature of joint coupler"),
+        ("armature", np.nan, "armature of joint coupler = nan"),
+        ("damping", np.nan, "damping of joint coupler = nan"),
+        ("rotorInertia", -1.0, "rotor inertia of joint coupler"),
+        ("upperEffortLimit", -1.0, "effort limit of joint coupler"),
+        ("upperVelocityLimit", -1.0, "velocity limit of joint coupler"),
+        ("upperPositionLimit", -1e9, "position limits of joint coupler"),
+        ("lowerPositionLimit", np.nan, "position limits of joint coupler"),
+        ("lowerEffortLimit", 1e9, "effort limits of joint coupler"),
+    ],
+)
+def test_losses_and_limits_that_no_joint_has_are_refused(field: str, value: float, message: str) -> None:
+    model = four_bar().model.copy()
+    values = np.array(getattr(model, field))
+    values[model.idx_vs[model.getJointId("coupler")]] = value
+    setattr(model, field, values)
+    with pytest.raises(InvalidInputError, match=message):
+        fb.ClosedChain(model, (), ("crank",))
+
+
+def test_gravity_that_is_no_number_is_refused() -> None:
+    model = four_bar().model.copy()
+    model.gravity.linear = np.array([0.0, np.nan, 0.0])
+    with pytest.raises(InvalidInputError, match="gravity"):
+        fb.ClosedChain(model, (), ("crank",))
+
+
+def test_mimic_joints_of_a_given_model_are_refused_by_name() -> None:
+    text = """<robot name="x"><link name="a"/><link name="b"/><link name="c"/>
+    <joint name="first" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+    <joint name="second" type="continuous"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
+    <mimic joint="first" multiplier="-1"/></joint></robot>"""
+    text = text.replace("continuous", "revolute").replace("<axis", '<limit effort="1" velocity="1"/><axis')
+    model = pin.buildModelFromXML(text, mimic=True)
+    with pytest.raises(InvalidInputError, match=r"mimic joints = \['second'\] but cannot be part of a chain"):
+        fb.ClosedChain(model, (), ("first",))
+    assert fb.ClosedChain(pin.buildModelFromXML(text), (), ("first",)).joints == ("first", "second")
+
+
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [("box", (0.1, -0.1, 0.1)), ("cylinder", (-0.1, 1.0)), ("capsule", (0.1, -1.0)), ("sphere", (-1e-9,))],
+)
+def test_shapes_of_negative_size_are_refused(shape: str, size: tuple[float, ...]) -> None:
+    with pytest.raises(InvalidInputError, match=f"size of {shape} on link = .* must not be negative"):
+        fb.Visual("link", shape, size)
+
+
+def test_a_mesh_may_be_mirrored_but_not_flattened() -> None:
+    assert fb.Visual("link", "mesh", (1.0, -1.0, 1.0), mesh="a.stl").size[1] == -1.0
+    with pytest.raises(InvalidInputError, match="must be scales other than zero"):
+        fb.Visual("link", "mesh", (1.0, 0.0, 1.0), mesh="a.stl")

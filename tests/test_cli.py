@@ -26,6 +26,8 @@ def test_demo_writes_all_it_names(results: Path) -> None:
     """The balanced mechanism, the table, the plots and the page are there."""
     names = {p.name for p in results.iterdir()}
     assert {"five_bar_balanced.urdf", "five_bar_balanced.yaml", "results.csv", "animation.html"} <= names
+    motion = fb.motion.from_file(results / "results.csv", ("psi", "gamma"))
+    np.testing.assert_array_equal(motion.q, fb.paper.default_motion(samples=101).q)
     assert {"motion.png", "torques.png", "shaking.png", "joint_forces.png", "mass_centre.png"} <= names
 
 

@@ -30,9 +30,9 @@ def test_gravity_in_one_direction_asks_for_less(capsys: pytest.CaptureFixture[st
     """The slider may keep its weight when gravity is across its way: one condition falls away."""
     assert main(["conditions", "slider_crank", "--kind", "static"]) == 0
     assert "rank 4" in capsys.readouterr().out
-    assert main(["conditions", "slider_crank", "--kind", "static", "--gravity", "0", "-1", "0"]) == 0
+    assert main(["conditions", "slider_crank", "--kind", "static", "--along", "0", "-1", "0"]) == 0
     assert "rank 3" in capsys.readouterr().out
-    assert main(["conditions", "slider_crank", "--gravity", "0", "-1", "0"]) == 1
+    assert main(["conditions", "slider_crank", "--along", "0", "-1", "0"]) == 1
     assert "--kind static only" in capsys.readouterr().err
 
 

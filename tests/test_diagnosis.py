@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +27,7 @@ from mechanisms import (
 
 import fivebar_pin as fb
 from fivebar_pin import paper
+from fivebar_pin._arrays import block_svd
 from fivebar_pin.diagnosis import Actuation, diagnose
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -410,3 +412,45 @@ def test_diagnosis_is_frozen_and_arguments_are_checked():
         diagnose(five_bar(), np.zeros(3))
     with pytest.raises(InvalidInputError, match=r"q\[2\] = nan but must be finite"):
         diagnose(five_bar(), [0.0, 0.0, np.nan, 0.0])
+
+
+def row_of(count: int, *, loops: bool) -> fb.ClosedChain:
+    """Return hinges one after the other, or as many four-bars side by side as have that many hinges."""
+    model, closures = pin.Model(), []
+    body, parent = pin.Inertia(1.0, np.array([0.2, 0.01, 0.0]), np.diag([0.01, 0.02, 0.03])), 0
+    for k in range(count):
+        place = pin.SE3(np.eye(3), np.array([0.4 if k % 3 == 1 else 0.1, 0.0, 0.0]))
+        if loops and k % 3 != 1:
+            parent, place = 0, pin.SE3(np.eye(3), np.array([2.0 * (k // 3) + 0.5 * (k % 3), 0.0, 0.0]))
+        parent = model.addJoint(parent, pin.JointModelRZ(), place, f"j{k}")
+        model.appendBodyToJoint(parent, body, pin.SE3.Identity())
+        if loops and k % 3:
+            tip = pin.SE3(np.eye(3), np.array([1.1 if k % 3 == 1 else 0.9, 0.0, 0.0]))
+            model.addFrame(pin.Frame(f"f{k}", parent, 0, tip, pin.FrameType.OP_FRAME))
+        if loops and k % 3 == 2:
+            closures.append(fb.Closure((f"f{k - 1}", f"f{k}")))
+    return fb.ClosedChain(model, closures, () if loops else tuple(f"j{k}" for k in range(count)))
+
+
+@pytest.mark.parametrize("loops", [False, True])
+def test_three_hundred_joints_are_diagnosed_soon(loops: bool) -> None:
+    chain = row_of(300, loops=loops)
+    before = time.process_time()
+    found = fb.diagnose(chain)
+    assert time.process_time() - before < 15.0  # 57 s and 4.4 GB with tables that grow with the cube of the joints
+    assert found.mobility == (100 if loops else 300) and found.rank == (200 if loops else 0)
+    assert len(found.redundant) == (100 if loops else 0) and found.gap < 1e-9
+
+
+@pytest.mark.parametrize("shape", [(70, 90), (90, 70), (80, 80)])
+def test_blocks_decompose_as_the_whole_does(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(3)
+    A = np.zeros(shape)
+    for k in range(0, 60, 6):
+        A[k : k + 5, k : k + 4] = rng.normal(size=(5, 4)) @ np.diag([1.0, 1.0, 1.0, k % 4 > 0])
+    A = A[rng.permutation(shape[0])][:, rng.permutation(shape[1])]
+    U, s, Vt = block_svd(A)
+    np.testing.assert_allclose(s, np.linalg.svd(A, compute_uv=False), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(U @ U.T, np.eye(shape[0]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(Vt @ Vt.T, np.eye(shape[1]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose((U[:, : s.size] * s) @ Vt[: s.size], A, rtol=0, atol=1e-13)

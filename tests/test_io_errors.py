@@ -485,3 +485,63 @@ def test_the_unspoilt_texts_of_the_fuzz_tests_are_accepted(tmp_path: Path) -> No
     chain = io.load(tmp_path / "m.xml")
     np.testing.assert_array_equal(chain.model.referenceConfigurations["home"], [0.1, 0.2])
     assert accepted(write(tmp_path, sidecar=SIDECAR + MORE))
+
+
+LOSSES = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="2" velocity="3"/><dynamics damping="0.1" friction="0.2"/></joint></robot>"""
+SIDE = "closed_loop: []\ntype: []\nname_mot: [j]\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "data", "message"),
+    [
+        ('damping="0.1"', 'damping="-0.1"', "", "joint 'j': damping = -0.1 must not be negative"),
+        ('friction="0.2"', 'friction="-1e-9"', "", "joint 'j': friction = -1e-09 must not be negative"),
+        ('size="0.1 0.1 0.1"', 'size="0.1 -0.1 0.1"', "", "visual of link 'b'.*must not be negative"),
+        ('<box size="0.1 0.1 0.1"/>', '<sphere radius="-1"/>', "", "visual of link 'b'.*must not be negative"),
+        ('<box size="0.1 0.1 0.1"/>', '<cylinder radius="1" length="-1"/>', "", "visual of link 'b'.*negative"),
+        ("", "", "effort: [-1]", "effort = .* must not be negative"),
+        ("", "", "velocity: [-1]", "velocity = .* must not be negative"),
+        ("", "", "damping: [-1]", "damping = .* must not be negative"),
+        ("", "", "lower: [2], upper: [1]", r"lower = \[2.0\] and upper = \[1.0\]: the lower limit is above the upper"),
+        ("", "", "lower: [2]", r"lower = \[2.0\] and upper = \[1.0\]: the lower limit is above the upper"),
+        ("", "", "effort_lower: [3]", "effort_lower = .* the lower limit is above the upper"),
+    ],
+)
+def test_losses_and_limits_that_no_joint_has_are_refused(
+    tmp_path: Path, old: str, new: str, data: str, message: str
+) -> None:
+    (tmp_path / "r.urdf").write_text(LOSSES.replace(old, new) if old else LOSSES)
+    (tmp_path / "r.yaml").write_text(SIDE + (f"joint_data: {{j: {{{data}}}}}\n" if data else ""))
+    with pytest.raises(FileFormatError, match=message):
+        io.load(tmp_path / "r.urdf")
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ('damping="-1"', "damping"),
+        ('frictionloss="-1"', "friction"),
+        ('armature="-1"', "armature"),
+        ('range="2 1"', "range|limits"),
+        ('actuatorfrcrange="2 1"', "actuatorfrcrange|limits"),
+    ],
+)
+def test_the_same_is_refused_in_mjcf(tmp_path: Path, word: str, message: str) -> None:
+    (tmp_path / "r.xml").write_text(
+        '<mujoco><compiler autolimits="true"/><worldbody><body name="b"><inertial pos="0 0 0" mass="1" '
+        f'diaginertia="1 1 1"/><joint name="j" axis="0 0 1" {word}/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(FileFormatError, match=message):
+        io.load(tmp_path / "r.xml")
+
+
+@pytest.mark.parametrize("tag", ["!!int ''", "!!bool x", "!!int _", "!!float ''"])
+def test_a_tag_that_does_not_fit_its_value_is_refused(tmp_path: Path, tag: str) -> None:
+    (tmp_path / "r.urdf").write_text(LOSSES)
+    (tmp_path / "r.yaml").write_text(SIDE + f"gravity: [0, 0, {tag}]\n")
+    with pytest.raises(FileFormatError, match=r"is not plain YAML|gravity"):
+        io.load(tmp_path / "r.urdf")

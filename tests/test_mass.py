@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
-from fivebar_pin._mass import depth_first, mass_matrix
+from fivebar_pin._mass import composite_mass_matrix, depth_first, mass_matrix
+from fivebar_pin._tree import Tree
 
 PARENTS = {"a": "", "b": "", "c": "a", "d": "b", "e": "a"}
 DEPTH_FIRST, BREADTH_FIRST = "acebd", "abcde"
@@ -57,3 +58,12 @@ def test_mass_matrix_and_accelerations_do_not_depend_on_the_order(order: str) ->
     np.testing.assert_allclose(
         accelerations[1], accelerations[0], rtol=0.0, atol=1e-12 * np.abs(accelerations[0]).max()
     )
+
+
+@pytest.mark.parametrize("order", [DEPTH_FIRST, BREADTH_FIRST, "bdaec"])
+def test_composite_bodies_give_the_same_mass_matrix(order: str) -> None:
+    """Two roads, one through Pinocchio, one through the inertia of all that each joint carries."""
+    model = tree(order).model
+    q = np.random.default_rng(5).normal(size=model.nq)
+    M = mass_matrix(model, model.createData(), q, ordered=depth_first(model))
+    np.testing.assert_allclose(composite_mass_matrix(Tree(model), model, q), M, rtol=0, atol=1e-13 * np.abs(M).max())

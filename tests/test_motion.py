@@ -162,6 +162,46 @@ def test_tables_without_rows_or_with_gaps_or_that_do_not_exist_are_refused(tmp_p
         laws.from_file(tmp_path / "none.csv")
 
 
+def test_positions_alone_get_their_rates_from_a_quintic_spline(tmp_path):
+    """Exact for a polynomial of degree five; too few samples are named with what is needed."""
+    t = np.linspace(0.0, 1.0, 9)
+    q = np.polynomial.Polynomial([0.1, -0.4, 0.3, 0.7, -0.2, 0.5])
+    rows = "".join(f"{float(a)!r},{float(b)!r}\n" for a, b in zip(t, q(t), strict=True))
+    (tmp_path / "m.csv").write_text("t [s],q crank [rad]\n" + rows)
+    m = laws.from_file(tmp_path / "m.csv")
+    np.testing.assert_allclose(m.v[:, 0], q.deriv()(t), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(m.a[:, 0], q.deriv(2)(t), rtol=0, atol=1e-10)
+    (tmp_path / "m.csv").write_text("t,q_x\n0,1\n1,2\n")
+    with pytest.raises(InvalidInputError, match="at least six"):
+        laws.from_file(tmp_path / "m.csv")
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "t [s],q one [rad],v one [rad/s],a one [rad/s2],q two [m],v two [m/s],a two [m/s2]",
+        "t [s],one [rad],done [rad/s],ddone [rad/s2],two [m],dtwo [m/s],ddtwo [m/s2]",
+        "t,q_one,v_one,a_one,q_two,v_two,a_two",
+    ],
+)
+def test_headers_with_units_are_read_and_columns_are_taken_by_name(tmp_path, head):
+    (tmp_path / "m.csv").write_text(head + ",tau one [N m]\n0,1,2,3,4,5,6,7\n1,2,3,4,5,6,7,8\n")
+    both = laws.from_file(tmp_path / "m.csv")
+    np.testing.assert_array_equal(both.q, [[1.0, 4.0], [2.0, 5.0]])
+    turned = laws.from_file(tmp_path / "m.csv", ("two", "one"))
+    np.testing.assert_array_equal(turned.v, [[5.0, 2.0], [6.0, 3.0]])
+    np.testing.assert_array_equal(laws.from_file(tmp_path / "m.csv", ("two",)).a[:, 0], [6.0, 7.0])
+    np.testing.assert_array_equal(laws.from_file(tmp_path / "m.csv", ("x", "y")).q, both.q)
+    with pytest.raises(FileFormatError, match="missing q_three, v_three, a_three; coordinates there: one, two"):
+        laws.from_file(tmp_path / "m.csv", ("one", "three"))
+
+
+def test_other_units_are_not_taken_for_ours(tmp_path):
+    (tmp_path / "m.csv").write_text("t [s],q x [deg],v x [deg/s],a x [deg/s2]\n0,1,2,3\n")
+    with pytest.raises(FileFormatError, match="unit must be rad or m or -, convert it first"):
+        laws.from_file(tmp_path / "m.csv")
+
+
 Z = np.zeros((3, 1))
 
 

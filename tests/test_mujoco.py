@@ -6,10 +6,14 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 
 import fivebar_pin as fb
 from fivebar_pin.cli._moving import sway
+from fivebar_pin.io import _mjcf_text
+from fivebar_pin.io._build import bare_inertia
 
 GRAVITY = (0.4, -9.81, 0.7)
 PLANAR_OR_SPATIAL = [name for name in fb.io.shipped() if fb.load(fb.io.shipped_path(name)).na]
@@ -51,8 +55,6 @@ def _mujoco_q(chain: fb.ClosedChain, model: mujoco.MjModel, q: np.ndarray) -> np
 @pytest.mark.parametrize("name", PLANAR_OR_SPATIAL)
 def test_torque_and_mass_matrix_agree_with_mujoco(name: str, tmp_path: Path) -> None:
     """[S^T J^T] [tau; lambda] = qfrc_inverse + qfrc_constraint of MuJoCo gives our tau; the mass matrices are equal."""
-    import pinocchio as pin
-
     chain, model = _both(name, tmp_path)
     data = mujoco.MjData(model)
     trajectory = sway(chain, fb.assemble(chain, _home(chain)), samples=25)
@@ -131,3 +133,71 @@ def test_closures_are_open_by_what_mujoco_says(equality: str, tmp_path: Path) ->
         (chain.model.upperDryFrictionLimit, model.dof_frictionloss),
     ):
         np.testing.assert_array_equal(np.array(ours)[columns], theirs)
+
+
+def _body(points: np.ndarray, masses: np.ndarray) -> pin.Inertia:
+    total = pin.Inertia.Zero()
+    for x, m in zip(points, masses, strict=True):
+        total = total + pin.Inertia(float(m), x, np.zeros((3, 3)))
+    return total
+
+
+@pytest.mark.parametrize("kind", ["flat", "rod", "point", "solid", "flat in x-y"])
+def test_mujoco_takes_every_body_that_can_be(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """300 random bodies of each kind, in any orientation: loaded, and the inertia is the same within round-off."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log where it stands
+    rng = np.random.default_rng(sum(map(ord, kind)))
+    for _ in range(300):
+        points = rng.normal(size=(6, 3)) * 10.0 ** rng.uniform(-3.0, 0.5)
+        flattened = {"flat": [1, 1, 0], "flat in x-y": [1, 1, 0], "rod": [1, 0, 0], "point": [0, 0, 0]}
+        turn = np.eye(3) if kind == "flat in x-y" else Rotation.random(random_state=rng).as_matrix()
+        masses = rng.uniform(0.1, 1.0, 6) * 10.0 ** rng.uniform(-2.0, 2.0)
+        points = (points * flattened.get(kind, [1, 1, 1])) @ turn.T + rng.normal(size=3)
+        inertia = _body(points, masses)
+        stated = f'pos="0 0 0" mass="{inertia.mass!r}" {_mjcf_text._inertia(inertia)}'
+        body = f"<body><freejoint/><inertial {stated}/></body>"
+        text = f'<mujoco><compiler inertiafromgeom="false"/><worldbody>{body}</worldbody></mujoco>'
+        model = mujoco.MjModel.from_xml_string(text)
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, model.body_iquat[1])
+        R = R.reshape(3, 3)
+        scale = inertia.mass * float(inertia.lever @ inertia.lever) + np.trace(inertia.inertia)
+        read = R @ np.diag(model.body_inertia[1]) @ R.T
+        np.testing.assert_allclose(read, inertia.inertia, rtol=0, atol=2e-14 * scale + 5e-15)
+
+
+def test_an_impossible_body_is_written_as_it_is() -> None:
+    """MuJoCo refuses it, and so does the diagnosis: the file does not hide what is wrong."""
+    wrong = bare_inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, 3.0]))
+    assert 'fullinertia="1 1 3 0 0 0"' in _mjcf_text._inertia(wrong).replace(".0", "")
+
+
+BALANCED = [name for name in PLANAR_OR_SPATIAL if name not in ("spatial_rssr", "delta")]  # these need other regions
+
+
+@pytest.mark.parametrize("mode", ["add", "redesign"])
+@pytest.mark.parametrize("name", BALANCED)
+def test_the_momentum_of_a_balanced_design_vanishes_in_mujoco_too(name: str, mode: str, tmp_path: Path) -> None:
+    chain = fb.load(fb.io.shipped_path(name))
+    near = fb.assemble(chain, _home(chain))
+    design = fb.balance(chain, "force", mode=mode, region=fb.balancing.Ball(0.5), near=near)
+    assert design.feasible
+    unbalanced, balanced = (_momentum(c, tmp_path / f"{k}.xml") for k, c in enumerate((chain, design.chain)))
+    assert balanced < 1e-11 * max(unbalanced, 1e-3)
+
+
+def _momentum(chain: fb.ClosedChain, file: Path) -> float:
+    """Return the largest linear momentum along a driven motion, as MuJoCo computes it [N s]."""
+    fb.save(chain, file)
+    chain, model = fb.load(file), mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    trajectory = sway(chain, fb.assemble(chain, _home(chain)), samples=25)
+    assert trajectory is not None
+    columns, worst = _columns(chain, model), 0.0
+    for k in range(len(trajectory)):
+        data.qpos[:] = _mujoco_q(chain, model, trajectory.q[k])
+        data.qvel[:] = trajectory.v[k][columns]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        worst = max(worst, float(np.abs(data.subtree_linvel[0]).max()) * float(model.body_subtreemass[0]))
+    return worst

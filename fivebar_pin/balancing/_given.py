@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import Rows
 from fivebar_pin.balancing._setup import MassBounds
@@ -19,7 +19,7 @@ from fivebar_pin.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Given:
+class Given(Immutable):
     """Arguments of `balance_problem`, checked, with the conditions and the quantities along the motions.
 
     Attributes:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing._parameters import Space, from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.balancing.design import Change, change_of
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lifted:
+class Lifted(Immutable):
     """Parameters of all bodies (nb, 10), what was added and removed, the smallest pseudo-inertia eigenvalue."""
 
     parameters: Array

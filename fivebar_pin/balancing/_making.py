@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing.design import Change, Design, change_of
 from fivebar_pin.balancing.pieces import ARM, Piece, Sphere, density_of
@@ -34,7 +34,7 @@ _GUESSES = (1.0, 0.5, 0.25, 0.75, 0.1)  # first sizes tried, between the solid p
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Size:
+class Size(Immutable):
     """Outer radius and centre (2,) about which a piece is bounded from above, in chain lengths."""
 
     radius: float
@@ -45,7 +45,7 @@ Sizes = Mapping[int, Size]  # by index of the body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Maker:
+class Maker(Immutable):
     """Looks for a design that can be made.
 
     Attributes:

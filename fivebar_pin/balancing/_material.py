@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing._cones import Cones, constant
 from fivebar_pin.balancing._parameters import _PAIRS, from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.balancing.pieces import Density, Solid
@@ -24,7 +24,7 @@ _RANK = 1e-9  # eigenvalue of a body's pseudo-inertia, as a share of the largest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bounds:
+class Bounds(Immutable):
     """What is asked of a piece besides being a body.
 
     Attributes:
@@ -43,7 +43,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Material:
+class Material(Immutable):
     """Variables of one piece of material.
 
     Attributes:

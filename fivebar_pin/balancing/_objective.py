@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable, reals
 from fivebar_pin.balancing._quantities import Rows, reflected_inertia
 from fivebar_pin.balancing._setup import Setup
 from fivebar_pin.balancing._terms import (
@@ -19,7 +19,6 @@ from fivebar_pin.balancing._terms import (
     check_terms,
     linear_term,
     measure_of,
-    numbers,
     positive_limit,
     rows_term,
     torque_limits,
@@ -29,9 +28,11 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 
+_HEAVIEST = 1e30  # weight of a term: products with it do not overflow [-]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TermMaker:
+class TermMaker(Immutable):
     """Builds terms and limits over designs X = X0 + E y (scaled) and pi = pi0 + full_E y."""
 
     chain: ClosedChain
@@ -96,9 +97,9 @@ def weights_of(minimise: str | Mapping[str, float] | None, mode: str) -> dict[st
     check_terms(given, "objective")
     weights = {}
     for name, weight in given.items():
-        value = numbers(f"weight of {name}", weight)
-        if value.ndim or not (np.isfinite(value) and value >= 0.0):
-            raise InvalidInputError(f"weight of {name}", weight, "must be one finite number, not negative")
+        value = reals(f"weight of {name}", weight)
+        if value.ndim or not (0.0 <= value <= _HEAVIEST):
+            raise InvalidInputError(f"weight of {name}", weight, f"must be one finite number from 0 to {_HEAVIEST:g}")
         weights[name] = float(value)
     if not any(weights.values()):
         raise InvalidInputError("minimise", weights, "must have a positive weight")

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, frozen
 
 TEN = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 _PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # order of the inertia entries
@@ -54,7 +54,7 @@ def from_pseudo_inertia(P: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Space:
+class Space(Immutable):
     """The parameters that conditions and designs are written in: four per body (planar) or ten (spatial).
 
     Attributes:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import ROUND_OFF, Array
+from fivebar_pin._arrays import ROUND_OFF, Array, Immutable
 from fivebar_pin._reactions import determinate
 from fivebar_pin.balancing._reaction_rows import reactions
 from fivebar_pin.balancing.regressors import regressor
@@ -32,7 +32,7 @@ MEASURES = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class Rows(Immutable):
     """A quantity along motions: values = F pi + f.
 
     Attributes:

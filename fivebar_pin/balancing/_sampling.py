@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._newton import Limits, polish, residual_of, search
 from fivebar_pin._once import once_per_chain
@@ -39,7 +39,7 @@ _SHELF = 8  # draws remembered for one chain
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class Samples(Immutable):
     """Closed, regular configurations.
 
     Attributes:

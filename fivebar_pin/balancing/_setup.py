@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, checked
+from fivebar_pin._arrays import Array, Immutable, checked
 from fivebar_pin.balancing import _lift
 from fivebar_pin.balancing._making import Sizes
 from fivebar_pin.balancing._material import Bounds, Material, material
@@ -25,7 +25,7 @@ CAP = 10.0  # largest mass added to one body unless given [moving masses]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup:
+class Setup(Immutable):
     """Names and bounds turned into materials and cones, lengths in chain lengths and masses in moving masses."""
 
     chain: ClosedChain

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, cross, skew
+from fivebar_pin._arrays import Array, Immutable, cross, skew
 from fivebar_pin._bodies import accelerations
 from fivebar_pin._loops import Loops, loops_of
 from fivebar_pin._tree import Poses
@@ -19,7 +19,7 @@ from fivebar_pin.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
+class State(Immutable):
     """Motion of all bodies, world axes: R (n, nb, 3, 3), everything else (n, nb, 3) at the joint origins."""
 
     loops: Loops

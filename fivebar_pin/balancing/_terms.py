@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable, reals
 from fivebar_pin.balancing._quantities import MEASURES, Rows
 from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
@@ -39,7 +39,7 @@ def measure_of(term: str) -> str | None:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Term:
+class Term(Immutable):
     """One term as a function of the design variables y: a linear one, or lengths of vectors.
 
     Attributes:
@@ -159,7 +159,7 @@ def _thin(G: Array, g: Array) -> list[tuple[Array, Array]]:
 
 def torque_limits(limit: npt.ArrayLike, rows: Rows, E: Array, pi0: Array) -> list[Block]:
     """Return the cones of |torque of every motor| <= its limit; one limit for all motors or one for each."""
-    given = np.atleast_1d(numbers("limit of peak_torque", limit))
+    given = np.atleast_1d(reals("limit of peak_torque", limit))
     if given.shape not in ((1,), (len(rows.groups),)):
         raise InvalidInputError("limit of peak_torque", given.tolist(), f"must be one number, or {len(rows.groups)}")
     each = np.broadcast_to(given, (len(rows.groups),))
@@ -175,15 +175,7 @@ def torque_limits(limit: npt.ArrayLike, rows: Rows, E: Array, pi0: Array) -> lis
 
 def positive_limit(name: str, limit: npt.ArrayLike) -> float:
     """Return a bound on a term as a number, checked."""
-    value = numbers(f"limit of {name}", limit)
+    value = reals(f"limit of {name}", limit)
     if value.ndim or not (np.isfinite(value) and value > 0.0):
         raise InvalidInputError(f"limit of {name}", limit, "must be one positive and finite number")
     return float(value)
-
-
-def numbers(name: str, given: npt.ArrayLike) -> Array:
-    """Return what a user gave as an array of numbers."""
-    try:
-        return np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInputError(name, given, "must hold numbers only") from None

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin._loops import Loops, inverse
 from fivebar_pin._newton import Limits
 
@@ -29,7 +29,7 @@ _DETOUR, _FREE = 0.4, 0.01  # longest way back to the closures, as a share of a 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ground:
+class Ground(Immutable):
     """Where a batch of walkers stands.
 
     Attributes:

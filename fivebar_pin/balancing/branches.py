@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._sampling import SpaceName, closed_at, random_samples
@@ -28,7 +28,7 @@ _ROUGH = 1e-2  # part of a condition outside another row space that tells branch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Branch:
+class Branch(Immutable):
     """What can be reached from one configuration without passing a singularity.
 
     Attributes:

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen, integer, skew
+from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integer, skew
 from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
@@ -33,13 +33,14 @@ __all__ = ["KINDS", "BalanceConditions", "balance_conditions"]
 
 KINDS = ("force", "moment", "dynamic", "static")
 _SMALL = 1e-6  # a singular value this far below the largest may be counted as zero [-]
+_MOST_SAMPLES = 1_000_000  # configurations; their rows are held in memory at once
 _CLEAR = 1e3  # ratio of neighbouring singular values that counts as a clear decision [-]
 _DOUBLINGS = 4  # how often the samples are doubled while the decision is not clear
 _ALIKE = 1e-9  # difference up to which directions [-], points, placements and configurations are the same [m, rad]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class BalanceConditions:
+class BalanceConditions(Immutable):
     """Linear conditions on the inertial parameters under which a chain is balanced.
 
     Attributes:
@@ -120,6 +121,7 @@ class BalanceConditions:
         return np.asarray(subspace_angles(self.basis.T, rows.T))
 
 
+@finite(open=("gap",))
 def balance_conditions(
     chain: ClosedChain,
     kind: str,
@@ -155,8 +157,8 @@ def balance_conditions(
     """
     if kind not in KINDS:
         raise UnknownNameError("kind of balance", kind, KINDS)
-    count = max(200, 20 * len(chain.joints)) if samples is None else samples
-    integer("samples", count, least=10)
+    wanted = max(200, 20 * len(chain.joints)) if samples is None else samples
+    count = integer("samples", wanted, least=10, most=_MOST_SAMPLES)
     integer("seed", seed)
     point = checked("about", about, (3,))
     direction = _direction(chain, gravity) if kind == "static" else None

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, figures, frozen
+from fivebar_pin._arrays import Array, Immutable, figures, frozen
 from fivebar_pin.balancing._making import across, arm_width
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import reflected_inertia
@@ -42,7 +42,7 @@ _RIM = 720  # points of a rim that are asked whether they lie in the region
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Counterweight:
+class Counterweight(Immutable):
     """One piece of material fixed to a body.
 
     Attributes:
@@ -86,7 +86,7 @@ class Counterweight:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Realisation:
+class Realisation(Immutable):
     """Counterweights for a design, and the mechanism that carries them.
 
     Attributes:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, figures, settled
+from fivebar_pin._arrays import Array, Immutable, figures, settled
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import Rows
 from fivebar_pin.balancing._terms import measure_of
@@ -27,7 +27,7 @@ __all__ = ["Certificate", "Change", "Design"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Change:
+class Change(Immutable):
     """Material added to one body (or removed from it, or the body as redesigned).
 
     Attributes:
@@ -46,7 +46,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Asked:
+class Asked(Immutable):
     """What a design answers: the problem, the weights of its terms, and limits besides those of the problem."""
 
     given: Given
@@ -55,7 +55,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design:
+class Design(Immutable):
     """A balanced mechanism, optimal for the objective, or the proof that there is none.
 
     Attributes:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, figures, frozen, integer
+from fivebar_pin._arrays import Array, Immutable, figures, frozen, integer
 from fivebar_pin.balancing._quantities import Motions
 from fivebar_pin.balancing._terms import check_terms
 from fivebar_pin.balancing.design import Design
@@ -21,12 +21,13 @@ from fivebar_pin.errors import InfeasibleError, InvalidInputError, UnknownNameEr
 
 __all__ = ["Comparison", "ParetoFront", "alici_shirinzadeh", "compare", "pareto"]
 
+_MOST_DESIGNS = 10_000  # on one front
 _TINY = 1e-6  # weight, in natural units, of the objective that only breaks ties
 _ROOM = 1e-7  # relative room at the ends of a front, where a bound leaves no interior
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ParetoFront:
+class ParetoFront(Immutable):
     """Designs of which none is better in both objectives than another.
 
     Attributes:
@@ -78,7 +79,7 @@ def pareto(
     check_terms((first, second), "objective")
     if first == second:
         raise InvalidInputError("objectives", (first, second), "must differ")
-    integer("n", n, least=2)
+    n = integer("n", n, least=2, most=_MOST_DESIGNS)
     problem = balance_problem(chain, kind, objectives=(first, second), **options)
     left, right = _end(problem, first, second), _end(problem, second, first)
     low, high = left.terms[first], right.terms[first]
@@ -135,7 +136,7 @@ def alici_shirinzadeh(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison:
+class Comparison(Immutable):
     """Mechanisms with the same kinematics, side by side.
 
     Attributes:

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen, number
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["MATERIALS", "Bar", "Disc", "Piece", "Sphere", "density_of"]
@@ -56,14 +56,11 @@ def density_of(material: str | float) -> float:
 
 def positive(name: str, value: float, unit: str) -> float:
     """Return a positive, finite number, checked."""
-    real = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
-    if not (real and np.isfinite(value) and value > 0.0):
-        raise InvalidInputError(name, value, f"must be positive and finite [{unit}]")
-    return float(value)
+    return number(name, value, positive=True, unit=unit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Disc:
+class Disc(Immutable):
     """Counterweights made as flat discs, solid or with a bore, of one material and thickness.
 
     Attributes:
@@ -89,7 +86,7 @@ class Disc:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bar:
+class Bar(Immutable):
     """Counterweights made as flat rectangles, along the line from the joint to their centre.
 
     Attributes:
@@ -111,7 +108,7 @@ class Bar:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sphere:
+class Sphere(Immutable):
     """Counterweights made as solid balls, for mechanisms of any kind.
 
     Attributes:
@@ -136,7 +133,7 @@ Piece = Disc | Bar | Sphere
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solid:
+class Solid(Immutable):
     """Scaled bounds of a piece. Flat: I_c >= least m^2 and w^2 = alpha m I_c + beta m^3, w = m r.
 
     A ball: second moments about the centre >= least m^(5/3) and w >= beta m^(4/3).
@@ -157,7 +154,7 @@ class Solid:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Density:
+class Density(Immutable):
     """Scaled bound on how dense material may be.
 
     Attributes:

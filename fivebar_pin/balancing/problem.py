@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen
 from fivebar_pin.balancing import _empty, _extent, _lift
 from fivebar_pin.balancing._given import Given
 from fivebar_pin.balancing._making import Maker, Sizes
@@ -72,7 +72,7 @@ class _Task:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class BalanceProblem:
+class BalanceProblem(Immutable):
     """A balancing problem prepared once, to be solved for any weights of its objectives.
 
     Attributes:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, frozen, number
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -24,7 +24,7 @@ __all__ = ["Ball", "Box", "Ellipsoid", "Region"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ball:
+class Ball(Immutable):
     """Material within a distance of a point.
 
     Attributes:
@@ -48,7 +48,7 @@ class Ball:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Box:
+class Box(Immutable):
     """Material within a box along the axes of the frame.
 
     Attributes:
@@ -73,7 +73,7 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ellipsoid:
+class Ellipsoid(Immutable):
     """Material within an ellipsoid along the axes of the frame.
 
     Attributes:
@@ -96,7 +96,7 @@ Region = Ball | Box | Ellipsoid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shape:
+class Shape(Immutable):
     """A region in the coordinates of one body's space (d = 2 planar, 3 spatial), lengths in any one unit.
 
     Attributes:
@@ -163,5 +163,5 @@ def _placement(frame: str, chain: ClosedChain, body: int) -> tuple[Array, Array]
 
 
 def _positive(name: str, value: float) -> None:
-    if not (isinstance(value, (int, float, np.floating, np.integer)) and np.isfinite(value) and value > 0.0):
+    if number(name, value, unit="m") <= 0.0:
         raise InvalidInputError(name, value, "must be positive and finite [m]", "An empty region holds no material.")

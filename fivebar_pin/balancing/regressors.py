@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, cross, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, cross, finite, frozen, reals
 from fivebar_pin.balancing._reaction_rows import marked, reactions
 from fivebar_pin.balancing._state import gravity_of, moved, side_by_side, state_of, torque_offset, tree_torque, turned
 from fivebar_pin.chain import ClosedChain
@@ -33,7 +33,7 @@ __all__ = ["QUANTITIES", "Regressor", "regressor"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Regressor:
+class Regressor(Immutable):
     """One quantity as matrix times inertial parameters, plus what does not depend on them.
 
     Attributes:
@@ -49,7 +49,7 @@ class Regressor:
 
     def __call__(self, parameters: npt.ArrayLike) -> Array:
         """Return the quantity (n, rows) for inertial parameters (nb, 10), or (k, n, rows) for (k, nb, 10)."""
-        pi = np.asarray(parameters, dtype=np.float64)
+        pi = reals("parameters", parameters)
         width = self.matrix.shape[2]
         if pi.ndim not in (2, 3) or pi.shape[-1] != 10 or pi.shape[-2] * 10 != width:
             raise InvalidInputError("shape of parameters", pi.shape, f"must be ({width // 10}, 10) or (k, .., 10)")
@@ -59,6 +59,7 @@ class Regressor:
         return np.asarray(np.einsum("nrp,kp->knr", self.matrix, flat, optimize=True) + self.offset)
 
 
+@finite(open=("matrix", "offset"))
 def regressor(
     chain: ClosedChain,
     trajectory: Trajectory,

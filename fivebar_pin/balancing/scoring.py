@@ -13,9 +13,9 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, figures, frozen
+from fivebar_pin._arrays import Array, Immutable, checked, figures, finite, frozen, reals
 from fivebar_pin.balancing._quantities import Motions, Rows, measure, reflected_inertia, trajectories
-from fivebar_pin.balancing._terms import LINEAR, TERMS, base, check_terms, measure_of, numbers
+from fivebar_pin.balancing._terms import LINEAR, TERMS, base, check_terms, measure_of
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
@@ -29,7 +29,7 @@ _SINGLE = 200_000  # multiplications in a matrix product that stays on one threa
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Scores:
+class Scores(Immutable):
     """Values of the terms for every design.
 
     Attributes:
@@ -56,6 +56,7 @@ class Scores:
         return int(np.argmin(self.values[term]))
 
 
+@finite()
 def score(
     chain: ClosedChain,
     motions: Motions,
@@ -196,7 +197,7 @@ def _peak(rows: Rows, x: Array) -> Array:
 
 
 def _designs(chain: ClosedChain, designs: npt.ArrayLike) -> Array:
-    X = numbers("designs", designs)
+    X = reals("designs", designs)
     nb = len(chain.joints)
     X = X[None] if X.ndim == 2 else X
     if X.ndim != 3 or X.shape[1:] != (nb, 10):

@@ -31,16 +31,15 @@ def variations(chain: ClosedChain, count: int, *, spread: float = 0.2, seed: int
         spread: typical relative change s, between 0 and 0.9 [-].
         seed: of the draw.
     """
-    integer("count", count, least=1)
+    count = integer("count", count, least=1)
     if not 0.0 <= number("spread", spread) <= 0.9:
         raise InvalidInputError("spread", spread, "must lie between 0 and 0.9")
-    integer("seed", seed)
     require_memory("count", count, _COPIES * count * chain.inertial_parameters.nbytes)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(integer("seed", seed))
     own = np.array(chain.inertial_parameters)
     P = pseudo_inertia(own)  # (nb, 4, 4)
-    out = np.empty((int(count), *own.shape))
-    for start in range(0, int(count), _BLOCK):
+    out = np.empty((count, *own.shape))
+    for start in range(0, count, _BLOCK):
         part = out[start : start + _BLOCK]
         A = spread * rng.uniform(-1.0, 1.0, (*part.shape[:2], 4, 4))
         A[..., 3, :3] = 0.0

@@ -1,22 +1,26 @@
-"""Loading what a user names on the command line."""
+"""Loading what a user names on the command line, under the gravity that is asked for."""
 
 from __future__ import annotations
 
-import os
+import argparse
+from collections.abc import Sequence
 
-from fivebar_pin._files import as_path
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.errors import UnknownNameError
 
 
-def load_any(path: str) -> ClosedChain:
-    """Load a file or folder; a bare name that is no file means a mechanism that ships with the library."""
+def add_gravity(parser: argparse.ArgumentParser) -> None:
+    """Add the option, which means the same in every command that has it."""
+    parser.add_argument(
+        "--gravity",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="gravity the mechanism is under, instead of the file's [m/s2]",
+    )
+
+
+def load_any(path: str, gravity: Sequence[float] | None = None) -> ClosedChain:
+    """Load a file, a folder or a mechanism that ships."""
     from fivebar_pin import io
 
-    where = as_path(path)
-    if not os.path.lexists(where) and where.name == path and not where.suffix:
-        names = io.shipped()
-        if path not in names:
-            raise UnknownNameError("file or shipped mechanism", path, names)
-        return io.load(io.shipped_path(path))
-    return io.load(where)
+    return io.load(path, gravity=gravity)

@@ -16,7 +16,7 @@ from fivebar_pin.trajectory import Trajectory
 def moved(chain: ClosedChain, file: str | None) -> Trajectory:
     """Move the chain as the file says, else let its motors sway as far as they can, else let it stand."""
     if file is not None:
-        return drive(chain, laws.from_file(file))
+        return drive(chain, laws.from_file(file, chain.actuated))
     q0 = standing(chain)
     swaying = sway(chain, q0)
     if swaying is not None:

@@ -12,6 +12,7 @@ from fivebar_pin._arrays import figures, integer, settled
 from fivebar_pin._files import check_folder, check_new, write_file, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
+from fivebar_pin.cli._load import add_gravity, load_any
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError
@@ -60,9 +61,8 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
 def run_conditions(chosen: argparse.Namespace) -> int:
     """Find and print the conditions, and how far the mechanism is from them."""
     from fivebar_pin.balancing import balance_conditions
-    from fivebar_pin.cli._load import load_any
 
-    chain = load_any(chosen.path)
+    chain = load_any(chosen.path, chosen.gravity)
     conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen))
     console = _tables.console()
     console.print(str(conditions), markup=False, soft_wrap=True)
@@ -76,10 +76,9 @@ def run_conditions(chosen: argparse.Namespace) -> int:
 def run_balance(chosen: argparse.Namespace) -> int:
     """Balance, print, write."""
     from fivebar_pin.balancing import balance, realise
-    from fivebar_pin.cli._load import load_any
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
-    chain = load_any(chosen.path)
+    chain = load_any(chosen.path, chosen.gravity)
     trajectory = moved(chain, chosen.motion)
     minimise = {name: 1.0 if value is None else value for name, value in _pairs("--minimise", chosen.minimise)}
     limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
@@ -111,11 +110,10 @@ def run_balance(chosen: argparse.Namespace) -> int:
 def run_pareto(chosen: argparse.Namespace) -> int:
     """Trace the front, print and write it."""
     from fivebar_pin.balancing import pareto
-    from fivebar_pin.cli._load import load_any
 
     integer("--points", chosen.points, least=2, most=_MOST_POINTS)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
-    chain = load_any(chosen.path)
+    chain = load_any(chosen.path, chosen.gravity)
     options = _options(chosen, moved(chain, chosen.motion))
     console = _tables.console()
     with _tables.progress().status("tracing the front"):
@@ -133,12 +131,13 @@ def run_pareto(chosen: argparse.Namespace) -> int:
 def _common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
     parser.add_argument("--kind", choices=KINDS, default="force", help="what is to vanish [force]")
+    add_gravity(parser)
     parser.add_argument(
-        "--gravity",
+        "--along",
         type=float,
         nargs=3,
         metavar=("X", "Y", "Z"),
-        help="static balance under gravity in this direction only [any direction]",
+        help="static balance for gravity along this direction only [any direction]",
     )
 
 
@@ -165,11 +164,11 @@ def _designing(parser: argparse.ArgumentParser) -> None:
 
 
 def _direction(chosen: argparse.Namespace) -> Any:
-    if chosen.gravity is None:
+    if chosen.along is None:
         return "any"
     if chosen.kind != "static":
-        raise InvalidInputError("--gravity", chosen.gravity, "has a meaning for --kind static only")
-    return chosen.gravity
+        raise InvalidInputError("--along", chosen.along, "has a meaning for --kind static only")
+    return chosen.along
 
 
 def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from fivebar_pin._arrays import Array, figures, integer, number
 from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
+from fivebar_pin.cli._load import add_gravity
 from fivebar_pin.dynamics import Loads, inverse_dynamics
 from fivebar_pin.kinematics import drive
 from fivebar_pin.motion import Motion
@@ -64,7 +65,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     parser.add_argument("--motion", metavar="CSV", help="motion of psi and gamma (t, q_*, v_*, a_*)")
     parser.add_argument("--samples", type=int, default=201, help="samples of the default motion [201]")
     parser.add_argument("--period", type=float, default=1.0, help="period of the default motion [1.0 s]")
-    parser.add_argument("--gravity", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"))
+    add_gravity(parser)
     parser.add_argument("--out", default="results", help="folder for everything that is written [results]")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
     parser.add_argument("--speed", type=float, default=0.5, help="playing speed of the animation [0.5]")
@@ -80,14 +81,14 @@ def run(chosen: argparse.Namespace) -> int:
     integer("--samples", chosen.samples, least=2, most=_output.MOST_SAMPLES)
     mode = paper.AssemblyMode[chosen.mode.upper()]
     motion = (
-        laws.from_file(chosen.motion)
+        laws.from_file(chosen.motion, ("psi", "gamma"))
         if chosen.motion is not None
         else paper.default_motion(samples=chosen.samples, period=chosen.period)
     )
     unbalanced = paper.table_1(chosen.case, "unbalanced")
     optimum = paper.balance(paper.table_1(chosen.case, "balanced", reading=chosen.reading))
     runs = [
-        _moved(label, linkage, motion, mode, chosen.gravity)
+        _moved(label, linkage, motion, mode, chosen.gravity or (0.0, 0.0, 0.0))
         for label, linkage in (("unbalanced", unbalanced), ("balanced", optimum.linkage))
     ]
     folder = check_folder(chosen.out, overwrite=chosen.overwrite)

@@ -10,6 +10,7 @@ from fivebar_pin._arrays import figures
 from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
+from fivebar_pin.cli._load import add_gravity, load_any
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import Loads, inverse_dynamics
 from fivebar_pin.trajectory import Trajectory
@@ -23,7 +24,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--motion", metavar="CSV", help="motion of the actuated joints (t, q_*, v_*, a_*); unless given, they sway"
     )
     parser.add_argument("--about", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"))
-    parser.add_argument("--gravity", type=float, nargs=3, metavar=("X", "Y", "Z"), help="instead of the file's")
+    add_gravity(parser)
     parser.add_argument("--out", metavar="FOLDER", help="write the curves, plots and an animation there")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
     parser.set_defaults(run=run)
@@ -31,17 +32,14 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
 
 def run(chosen: argparse.Namespace) -> int:
     """Move the mechanism and print what it takes."""
-    from fivebar_pin.cli._load import load_any
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
-    chain = load_any(chosen.path)
-    if chosen.gravity:
-        chain = chain.with_gravity(chosen.gravity)
+    chain = load_any(chosen.path, chosen.gravity)
     trajectory = moved(chain, chosen.motion)
     loads = inverse_dynamics(chain, trajectory, about=chosen.about)
     files: tuple[Path, ...] = ()
     if folder is not None:
-        motion = laws.from_file(chosen.motion) if chosen.motion is not None else None
+        motion = laws.from_file(chosen.motion, chain.actuated) if chosen.motion is not None else None
         files = write_set(folder, _files(chain, trajectory, loads, motion), overwrite=chosen.overwrite)
     console = _tables.console()
     _print(console, chain, trajectory, loads)

@@ -14,6 +14,7 @@ from fivebar_pin._arrays import Array, figures, integer
 from fivebar_pin._files import as_path, check_new, read_bounded, write_file
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
+from fivebar_pin.cli._load import add_gravity, load_any
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.errors import FileFormatError, InvalidInputError
 
@@ -52,17 +53,17 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--best", type=int, default=5, metavar="K", help="how many designs to list, by the first term [5]"
     )
     parser.add_argument("--out", metavar="CSV", help="write all scores as a table")
+    add_gravity(parser)
     parser.set_defaults(run=run)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Read or draw the designs, score them with progress, print the best, write all."""
     from fivebar_pin.balancing import variations
-    from fivebar_pin.cli._load import load_any
 
     integer("--best", chosen.best, least=1)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
-    chain = load_any(chosen.path)
+    chain = load_any(chosen.path, chosen.gravity)
     if chosen.designs is not None:
         designs = _read(as_path(chosen.designs), chain)
     else:

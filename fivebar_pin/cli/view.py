@@ -8,6 +8,7 @@ import os
 from fivebar_pin._arrays import integer, number
 from fivebar_pin._files import as_path, check_folder, check_new
 from fivebar_pin.cli import _tables
+from fivebar_pin.cli._load import add_gravity, load_any
 from fivebar_pin.cli._moving import moved
 from fivebar_pin.dynamics import inverse_dynamics
 
@@ -21,13 +22,13 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     parser.add_argument("--speed", type=float, default=1.0, help="playing speed over real time [1]")
     parser.add_argument("--port", type=int, help="port of the live view (loopback only); a free one unless given")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
+    add_gravity(parser)
     parser.set_defaults(run=run)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Load, move and show the mechanism."""
     from fivebar_pin import viz
-    from fivebar_pin.cli._load import load_any
 
     number("--speed", chosen.speed, positive=True)
     if chosen.port is not None:
@@ -37,7 +38,7 @@ def run(chosen: argparse.Namespace) -> int:
         check_folder(file.parent, overwrite=True)
         if os.path.lexists(file):
             check_new(file, overwrite=chosen.overwrite)
-    chain = load_any(chosen.path)
+    chain = load_any(chosen.path, chosen.gravity)
     trajectory = moved(chain, chosen.motion)
     shown = [viz.Shown(chain, trajectory, inverse_dynamics(chain, trajectory) if len(trajectory) > 1 else None)]
     if chosen.html is not None:

@@ -17,6 +17,7 @@ from fivebar_pin.io._tree import UNLIMITED, JointEntry, TreeEntry
 __all__ = ["bare_inertia", "build_model", "joint_model", "joint_order", "set_default_limits"]
 
 ROOT_JOINT = "root_joint"
+_NOT_NEGATIVE = ("armature", "damping", "effort", "friction", "rotor_inertia", "velocity")
 _AXES = {(1.0, 0.0, 0.0): 0, (0.0, 1.0, 0.0): 1, (0.0, 0.0, 1.0): 2}
 _ALIGNED = {
     "revolute": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
@@ -240,14 +241,26 @@ def _set_data(model: pin.Model, name: str, entries: Mapping[str, list[float]], b
         if len(values) != count:
             problem = f"{word} has {len(values)} values; the joint has {count}"
             raise FileFormatError(beside, f"joint_data of {name}: {problem}")
-        if word in ("armature", "damping", "friction", "rotor_inertia") and min(values) < 0.0:
+        if word in _NOT_NEGATIVE and min(values) < 0.0:
             raise FileFormatError(beside, f"joint_data of {name}: {word} = {values} must not be negative")
         _set_entry(model, j, word, np.array(values))
+    for low, high, part in (("lower", "upper", _q_part(model, j)), ("effort_lower", "effort", _v_part(model, j))):
+        limits = [getattr(model, DATA_FIELDS[word])[part] for word in (low, high)]
+        if np.any(limits[0] > limits[1]):
+            stated = " and ".join(f"{word} = {x.tolist()}" for word, x in zip((low, high), limits, strict=True))
+            raise FileFormatError(beside, f"joint_data of {name}: {stated}: the lower limit is above the upper")
+
+
+def _q_part(model: pin.Model, j: int) -> slice:
+    return slice(model.idx_qs[j], model.idx_qs[j] + model.nqs[j])
+
+
+def _v_part(model: pin.Model, j: int) -> slice:
+    return slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
 
 
 def _set_entry(model: pin.Model, j: int, word: str, values: Array) -> None:
-    q = slice(model.idx_qs[j], model.idx_qs[j] + model.nqs[j])
-    v = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+    q, v = _q_part(model, j), _v_part(model, j)
     getattr(model, DATA_FIELDS[word])[q if word in ("lower", "upper") else v] = values
     mirrored = {"effort": "lowerEffortLimit", "velocity": "lowerVelocityLimit", "friction": "lowerDryFrictionLimit"}
     if word in mirrored:

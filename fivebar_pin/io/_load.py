@@ -10,10 +10,11 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import checked
 from fivebar_pin._files import MAX_BYTES, as_path
-from fivebar_pin.chain import ClosedChain, Visual, find_frame
+from fivebar_pin.chain import ClosedChain, Visual, frames_by_name
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
+from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
 from fivebar_pin.io._tree import TreeEntry
 from fivebar_pin.io._urdf import read_urdf
@@ -34,7 +35,8 @@ def load(
 
     Args:
         path: a folder with one URDF (and its sidecar) or one MJCF file; a .urdf file whose sidecar lies beside it
-            under the same name (.yaml or .yml), or as the folder's only sidecar; or an MJCF .xml file.
+            under the same name (.yaml or .yml), or as the folder's only sidecar; an MJCF .xml file; or the name of a
+            mechanism that ships (`shipped`), where no file or folder is called so.
         free_flyer: put the root of a URDF on a free-flying base.
         closures: use these instead of the file's closures; with `actuated`, no sidecar is needed.
         actuated: drive these joints instead of the file's.
@@ -46,9 +48,10 @@ def load(
 
     Raises:
         FileFormatError: a file is missing, malformed or states something impossible; names file, element, way out.
-        InvalidInputError, UnknownNameError: an argument of this call is wrong.
+        InvalidInputError, UnknownNameError: an argument of this call is wrong, or no file and no mechanism that ships
+            has this name.
     """
-    where = as_path(path)
+    where = _named(as_path(path))
     file = _mechanism_file(where)
     given_closures = None if closures is None else _closures(closures)
     given_actuated = None if actuated is None else _names(actuated)
@@ -79,6 +82,18 @@ def _names(actuated: Iterable[str]) -> tuple[str, ...]:
         if not isinstance(name, str):
             raise InvalidInputError("actuated", name, "must be joint names")
     return names
+
+
+def _named(path: Path) -> Path:
+    """Return the path, or the mechanism that ships under a bare name that is no file."""
+    try:
+        if path.name != str(path) or path.suffix or path.exists():
+            return path
+    except OSError as error:
+        raise FileFormatError(path, f"cannot be looked at ({error.strerror or error})") from error
+    if path.name not in shipped():
+        raise UnknownNameError("file, folder or shipped mechanism", path.name, shipped())
+    return shipped_path(path.name)
 
 
 def _mechanism_file(path: Path) -> Path:
@@ -178,6 +193,7 @@ def make_chain(
 def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
     """Refuse closure frames that do not exist, are ambiguous (a link's name never is), or lie on one body."""
     frames: dict[str, list[pin.Frame]] = {}
+    named = frames_by_name(model) if closures else {}
     for frame in model.frames:
         frames.setdefault(frame.name, []).append(frame)
     for k, closure in enumerate(closures):
@@ -187,7 +203,7 @@ def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, 
             same = [f for f in frames[name] if f.type not in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)]
             if len(same) > 1:
                 raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
-        joints = [find_frame(model, name).parentJoint for name in closure.frames]
+        joints = [named[name].parentJoint for name in closure.frames]
         if joints[0] == joints[1]:
             body = model.names[joints[0]]
             raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")

@@ -27,6 +27,9 @@ __all__ = ["mjcf_text"]
 
 _KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "SPHERICAL": "ball", "floating": "free"}
 _LIMITLESS = 1e300
+_THIN = 1e-9  # second moment below which a body counts as flat, a rod or a point [m |c|^2 + moments of inertia]
+_LEAST = 1e-15  # moment of inertia that MuJoCo takes a moving body to have at least (its mjMINVAL) [kg m2]
+_SMALL = 1e-12  # moment of inertia below which MuJoCo takes no full tensor (some hundred times its mjEPS) [kg m2]
 
 
 def mjcf_text(chain: ClosedChain, folder: Path) -> str:
@@ -98,10 +101,8 @@ class _Writer:
         lines += [self.joint(each, indent + "  ") for each in stacked]
         inertia = self.tree.links[link].inertia
         if inertia is not None:
-            I = np.array(inertia.inertia)
-            full = numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]])
-            stated = f'pos="{numbers(inertia.lever)}" mass="{numbers([inertia.mass])}" fullinertia="{full}"'
-            lines.append(f"{indent}  <inertial {stated}/>")
+            stated = f'pos="{numbers(inertia.lever)}" mass="{numbers([inertia.mass])}"'
+            lines.append(f"{indent}  <inertial {stated} {_inertia(inertia)}/>")
         return [*lines, *self.contents(link, indent + "  "), f"{indent}</body>"]
 
     def stacked(self, joint: JointEntry) -> list[JointEntry]:
@@ -222,6 +223,26 @@ class _Writer:
             shape = f'type="{visual.shape}" size="{numbers([size[0], 0.5 * size[1]])}"'
         rest = f'rgba="{numbers(visual.rgba)}" contype="0" conaffinity="0" mass="0"'
         return [f"{indent}<geom {shape}{_pose(M)} {rest}/>"]
+
+
+def _inertia(inertia: pin.Inertia) -> str:
+    """Return a tensor about the mass centre in the form that MuJoCo takes.
+
+    It asks principal moments for A + B >= C. A flat body has A + B = C, and MuJoCo's own principal axes of a full
+    tensor may miss it by round-off. Such a body is given in principal axes, its moments made of second moments
+    a, b, c >= 0: (b + c) + (a + c) >= a + b, which rounding keeps because it is monotonic.
+    """
+    I = np.array(inertia.inertia)
+    moments, R = np.linalg.eigh(I)
+    second = 0.5 * moments.sum() - moments
+    scale = np.abs(moments).sum() + inertia.mass * float(inertia.lever @ inertia.lever)
+    thin = second.min() < _THIN * scale or moments[0] < _SMALL
+    if not thin or second.min() < -_THIN * scale:  # an impossible body is written as it is
+        return f'fullinertia="{numbers([I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]])}"'
+    real = np.maximum(second, 0.0)
+    a, b, c = real if np.sort(real)[:2].sum() > _LEAST else np.maximum(real, _LEAST)
+    x, y, z, w = pin.Quaternion(R * [1.0, 1.0, np.sign(np.linalg.det(R))]).coeffs()
+    return f'diaginertia="{numbers([b + c, a + c, a + b])}" quat="{numbers([w, x, y, z])}"'
 
 
 def _section(tag: str, lines: list[str]) -> list[str]:

@@ -139,7 +139,7 @@ def _plain_yaml(path: Path, max_bytes: int) -> object:
         return yaml.load(text.decode("utf-8"), Loader=Loader)
     except UnicodeDecodeError as error:
         raise FileFormatError(path, f"is not UTF-8 text ({error})") from error
-    except (yaml.YAMLError, ValueError, TypeError, AttributeError, RecursionError, OverflowError) as error:
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, RecursionError, OverflowError, LookupError) as error:
         raise FileFormatError(path, "is not plain YAML (" + " ".join(str(error).split()) + ")") from error
 
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import Visual
-from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import bare_inertia
 from fivebar_pin.io._tree import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
 from fivebar_pin.io._xml import Reader, parse_xml
@@ -179,6 +179,9 @@ def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: 
         "damping": reader.numbers(dynamics, "damping", 1, where, [0.0]),
         "friction": reader.numbers(dynamics, "friction", 1, where, [0.0]),
     }
+    for word, (value,) in data.items():
+        if value < 0.0:
+            raise reader.fail(where, f"{word} = {value!r} must not be negative")
     if limit is None:
         if kind != "continuous":
             raise reader.fail(where, "needs <limit lower= upper= effort= velocity=>")
@@ -235,7 +238,11 @@ def _visual(reader: Reader, element: ElementTree.Element, link: str, colours: Co
         colour = material.find("color")
         known = colours.get(material.get("name") or "", _GREY)
         rgba = known if colour is None else _rgba(reader, colour, where)
-    return Visual(link, shape.tag, tuple(size), _homogeneous(*_origin(reader, element, where)), rgba, mesh)
+    placement = _homogeneous(*_origin(reader, element, where))
+    try:
+        return Visual(link, shape.tag, tuple(size), placement, rgba, mesh)
+    except InvalidInputError as error:
+        raise reader.fail(where, str(error)) from error
 
 
 def _mesh_file(urdf: Path, filename: str) -> str:

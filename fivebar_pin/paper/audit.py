@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from fivebar_pin._arrays import Immutable
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper.closed_form import solve
 from fivebar_pin.paper.equations import Conditions, conditions
@@ -26,7 +27,7 @@ READINGS: dict[str, Callable[[complex], complex]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Loading:
+class Loading(Immutable):
     """Largest absolute values along a motion: torques [N m], shaking force [N] and moment about O1 [N m]."""
 
     torque_1: float
@@ -36,7 +37,7 @@ class Loading:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AuditRow:
+class AuditRow(Immutable):
     """A printed balanced column beside the unbalanced one and the exact optimum for its masses.
 
     Attributes:

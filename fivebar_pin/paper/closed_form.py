@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen
+from fivebar_pin._arrays import Array, checked, finite, frozen
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper.kinematics import links, partials, passive_acceleration, unwrapped
@@ -26,6 +26,7 @@ __all__ = ["solve", "solve_states"]
 _BLOCK = 2048  # samples per block: the temporaries stay in the cache
 
 
+@finite()
 def solve(
     linkage: FiveBar,
     motion: Motion,
@@ -50,6 +51,7 @@ def solve(
     return _solve(linkage, motion.t, driven, AssemblyMode.parse(mode), gravity, motion.t)
 
 
+@finite()
 def solve_states(
     linkage: FiveBar,
     q: npt.ArrayLike,

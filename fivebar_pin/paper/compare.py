@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, finite, frozen
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.motion import Motion
@@ -25,7 +25,7 @@ __all__ = ["Comparison", "compare_complements"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+class Comparison(Immutable):
     """Largest values over the samples at which psi' is not zero.
 
     Attributes:
@@ -77,6 +77,7 @@ class Comparison:
         return "\n".join([head, *body])
 
 
+@finite()
 def compare_complements(
     linkage: FiveBar, motion: Motion | None = None, *, mode: AssemblyMode = AssemblyMode.LEFT
 ) -> Comparison:

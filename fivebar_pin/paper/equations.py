@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, finite, frozen
 from fivebar_pin.paper.linkage import FiveBar
 
 __all__ = ["EQUATIONS", "Conditions", "conditions"]
@@ -30,7 +30,7 @@ RIGHT = frozen([0.0] * 6 + [1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Conditions:
+class Conditions(Immutable):
     """How far a linkage is from force balance.
 
     Attributes:
@@ -63,6 +63,7 @@ class Conditions:
         return self.equations, self.residuals.tolist(), self.mass_residuals.tolist()
 
 
+@finite()
 def conditions(linkage: FiveBar) -> Conditions:
     """Return the residuals of (60)-(63), (68), (69), (70) and the ratios of (71)."""
     mu, mass = linkage.mass_ratios, float(linkage.masses.sum())

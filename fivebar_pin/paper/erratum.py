@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fivebar_pin._arrays import Immutable
 from fivebar_pin.paper import evidence as ev
 from fivebar_pin.paper.solution import Solution
 
@@ -12,7 +13,7 @@ __all__ = ["Erratum", "errata"]
 
 
 @dataclass(frozen=True, slots=True)
-class Erratum:
+class Erratum(Immutable):
     """A slip of the paper and the evidence for it.
 
     Attributes:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.errors import AssemblyError, SingularityError
 from fivebar_pin.paper.linkage import AssemblyMode, CArray, FiveBar
 
@@ -26,7 +26,7 @@ SINGULAR = 1e-7  # |sin(theta - phi)| [-] below this counts as singular: its squ
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pose:
+class Pose(Immutable):
     """Positions of the linkage. Angles (n,) [rad] in (-pi, pi], link vectors b (4, n) [m], X (n,) [m2]."""
 
     theta: Array

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, frozen, numeric
+from fivebar_pin._arrays import Array, Immutable, checked, frozen, numeric
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
@@ -54,7 +54,7 @@ class AssemblyMode(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FiveBar:
+class FiveBar(Immutable):
     """Parameters of the planar five-bar linkage.
 
     Attributes:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, finite
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.paper.linkage import FiveBar
 from fivebar_pin.paper.solution import Solution
@@ -19,6 +19,7 @@ __all__ = ["TWISTS", "A", "B", "C", "M", "inertia", "tau", "twist", "twist_rate"
 TWISTS = tuple(f"{x}{i}" for i in range(1, 5) for x in ("omega_", "c'_x", "c'_y"))
 
 
+@finite()
 def vectors(solution: Solution) -> tuple[Array, Array, Array]:
     """Return r_i, b_i and r_{i,i+1}, each (n, 4, 2) [m], world axes."""
     z = np.exp(1j * solution.angles) * (solution.linkage.lengths[:4] * np.array([1.0, 1.0, -1.0, -1.0]))
@@ -71,6 +72,7 @@ def M(linkage: FiveBar) -> Array:
     return np.diag(np.stack([linkage.inertias, linkage.masses, linkage.masses], axis=1).ravel())
 
 
+@finite()
 def u(solution: Solution, *, form: str = "repaired") -> Array:
     """Return the complement (41), t = u (psi', gamma'), (n, 12, 2).
 
@@ -82,12 +84,14 @@ def u(solution: Solution, *, form: str = "repaired") -> Array:
     return _complement(solution, _passive(solution, form))
 
 
+@finite()
 def u_dot(solution: Solution, *, form: str = "repaired") -> Array:
     """Return the time derivative of u, (n, 12, 2)."""
     _known(form)
     return _complement_rate(solution, _passive(solution, form), _passive_rate(solution, form))
 
 
+@finite()
 def twist(solution: Solution) -> Array:
     """Return t (n, 12), (38), from the rates of all four links."""
     r, b, z = vectors(solution)
@@ -101,12 +105,14 @@ def twist(solution: Solution) -> Array:
     return out.reshape(-1, 12)
 
 
+@finite()
 def twist_rate(solution: Solution, *, form: str = "repaired") -> Array:
     """Return t' = u q'' + u' q' (n, 12), (45); printed and repaired u agree on it."""
     v, a = solution.rates[:, ::3], solution.accelerations[:, ::3]
     return _apply(u(solution, form=form), a) + _apply(u_dot(solution, form=form), v)
 
 
+@finite()
 def inertia(solution: Solution, *, form: str = "repaired") -> Array:
     """Return the generalized inertia matrix u^T M u of (46), (n, 2, 2) [kg m2]."""
     U = u(solution, form=form)
@@ -119,6 +125,7 @@ def C(solution: Solution, *, form: str = "repaired") -> Array:
     return np.asarray(-np.swapaxes(U, 1, 2) @ M(solution.linkage) @ u_dot(solution, form=form))
 
 
+@finite()
 def tau(solution: Solution, *, form: str = "repaired") -> Array:
     """Return the motor torques without gravity, tau = u^T M t', (72), (n, 2) [N m]."""
     U = u(solution, form=form)

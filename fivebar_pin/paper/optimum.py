@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, frozen, number, numeric
+from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, number, numeric
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, SolverError
 from fivebar_pin.paper.equations import Conditions, conditions
 from fivebar_pin.paper.linkage import FiveBar
@@ -21,7 +21,7 @@ Bounds = tuple[npt.ArrayLike, npt.ArrayLike]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Optimum:
+class Optimum(Immutable):
     """A force balanced linkage that minimises (77), and the evidence that it does.
 
     Attributes:
@@ -65,6 +65,7 @@ class Optimum:
         )
 
 
+@finite(open=("bound_multipliers", "curvature", "multipliers"))
 def balance(
     linkage: FiveBar,
     *,
@@ -99,6 +100,7 @@ def balance(
     return _best(linkage, problem, only or starts, points, tolerance)
 
 
+@finite(open=("bound_multipliers", "curvature", "multipliers"))
 def balance_masses(
     linkage: FiveBar,
     *,

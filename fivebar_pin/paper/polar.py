@@ -6,13 +6,14 @@ are 3 x 3 blocks, one per link.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.paper.equations import RIGHT, ROWS
 
 __all__ = ["Problem", "Stationary", "alone", "climb"]
@@ -21,7 +22,7 @@ _NEAR = 1e-7  # a variable this close to its bound after the first solver is tri
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class Problem(Immutable):
     """Minimise (77) under the conditions.
 
     Attributes:
@@ -88,7 +89,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stationary:
+class Stationary(Immutable):
     """A point and what is known of its optimality.
 
     Attributes:
@@ -127,19 +128,21 @@ def climb(problem: Problem, start: Array) -> Stationary:
         x[free] = np.clip(z, problem.low[free], problem.high[free])
         return x
 
-    answer = minimize(
-        lambda z: problem.objective(whole(z)),
-        first[free],
-        jac=lambda z: problem.gradient(whole(z))[free],
-        bounds=list(zip(problem.low[free], problem.high[free], strict=True)),
-        constraints={
-            "type": "eq",
-            "fun": lambda z: problem.residual(whole(z)),
-            "jac": lambda z: problem.jacobian(whole(z))[:, free],
-        },
-        method="SLSQP",
-        options={"maxiter": 300, "ftol": 1e-13},
-    )
+    with warnings.catch_warnings():  # before 1.16 SciPy tells of bounds that it missed by round-off itself and mended
+        warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
+        answer = minimize(
+            lambda z: problem.objective(whole(z)),
+            first[free],
+            jac=lambda z: problem.gradient(whole(z))[free],
+            bounds=list(zip(problem.low[free], problem.high[free], strict=True)),
+            constraints={
+                "type": "eq",
+                "fun": lambda z: problem.residual(whole(z)),
+                "jac": lambda z: problem.jacobian(whole(z))[:, free],
+            },
+            method="SLSQP",
+            options={"maxiter": 300, "ftol": 1e-13},
+        )
     return _polish(problem, whole(np.asarray(answer.x)))
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, Immutable, finite, frozen
 from fivebar_pin.paper.linkage import AssemblyMode, CArray, FiveBar
 from fivebar_pin.trajectory import Trajectory
 
@@ -15,7 +15,7 @@ __all__ = ["Solution"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution:
+class Solution(Immutable):
     """Motion and loads of the five-bar. Columns of angles, rates and accelerations: psi, theta, phi, gamma.
 
     Attributes:
@@ -77,18 +77,20 @@ class Solution:
         return Trajectory(self.t, frozen(q), frozen(v), frozen(a), frozen(N), frozen(self.closure_residual))
 
     @cached_property
+    @finite()
     def closure_residual(self) -> Array:
         """How far the loop (1) stays open, the larger component along and across link 2, from the angles (n,) [m]."""
         turn = np.exp(1j * self.angles)
         b = self.linkage.lengths[:4] * turn
         gap = (b[:, 0] + b[:, 1] - self.linkage.lengths[4] - b[:, 3] - b[:, 2]) * turn[:, 1].conj()
-        return np.asarray(np.maximum(np.abs(gap.real), np.abs(gap.imag)))
+        return frozen(np.maximum(np.abs(gap.real), np.abs(gap.imag)))
 
     @cached_property
+    @finite()
     def energy(self) -> Array:
         """Kinetic energy (n,) [J]."""
         m, c = self.linkage.masses, _mass_centre_rates(self.linkage, self.angles, self.rates)
-        return np.asarray(0.5 * ((np.abs(c) ** 2) @ m + (self.rates**2) @ self.linkage.inertias))
+        return frozen(0.5 * ((np.abs(c) ** 2) @ m + (self.rates**2) @ self.linkage.inertias))
 
 
 def _relative(x: Array) -> Array:

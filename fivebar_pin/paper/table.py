@@ -88,8 +88,8 @@ def default_motion(*, samples: int = 201, period: float = 1.0) -> Motion:
         samples: number of instants over [0, period], both ends included.
         period: duration [s].
     """
-    integer("samples", samples, least=2)
+    samples = integer("samples", samples, least=2, most=10**8)
     number("period", period, positive=True, unit="s")
-    t = np.linspace(0.0, period, int(samples))
+    t = np.linspace(0.0, period, samples)
     psi = laws.cycloidal(t, 0.0, 2.0 * np.pi, duration=period)
     return laws.combine(psi, laws.harmonic(t, np.pi / 2.0, -np.pi / 6.0, period=period))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, finite
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.paper.linkage import FiveBar
 from fivebar_pin.paper.solution import Solution
@@ -65,6 +65,7 @@ def theta_loop(linkage: FiveBar, psi: Array, gamma: Array, theta: Array, *, form
     )
 
 
+@finite()
 def ratios(solution: Solution, *, form: str = "repaired") -> Ratios:
     """Return r_phi, (17), and r_theta, (A9)-(A11).
 
@@ -82,6 +83,7 @@ def ratios(solution: Solution, *, form: str = "repaired") -> Ratios:
     return Ratios(*found)
 
 
+@finite()
 def ratio_rates(solution: Solution) -> Ratios:
     """Return the time derivatives of r_phi, (20), and of r_theta, (A13), repaired.
 

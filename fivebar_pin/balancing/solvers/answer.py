@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.program import Problem
 
 __all__ = ["Answer", "Solver", "nothing"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answer:
+class Answer(Immutable):
     """One answer of a solver to a problem.
 
     Attributes:

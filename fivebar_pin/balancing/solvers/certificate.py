@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.bound import reach, stationary
 from fivebar_pin.balancing.solvers.cones import outside
 from fivebar_pin.balancing.solvers.program import Program
@@ -26,7 +26,7 @@ _LEAST = 1e-15  # nothing is proved better than this [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Certificate:
+class Certificate(Immutable):
     """A proof that a set of conditions and bounds has no solution.
 
     Attributes:

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.cones import CONES, outside, projected
 
 __all__ = ["Block", "Problem", "Program"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Block:
+class Block(Immutable):
     """Rows g + G x in one cone: "zero", "nonneg", "soc" or "psd" (scaled upper triangle, column by column).
 
     Attributes:
@@ -77,7 +77,7 @@ class Program:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class Problem(Immutable):
     """One objective over the constraints of a program.
 
     Attributes:

@@ -10,7 +10,7 @@ from importlib import import_module
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.answer import Answer, Solver
 from fivebar_pin.balancing.solvers.bound import lower_bound, refined
 from fivebar_pin.balancing.solvers.certificate import Certificate, certificate_of
@@ -25,7 +25,7 @@ SECOND = "scipy"  # asked where the default has no acceptable answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class Outcome(Immutable):
     """What came of a solve. x is None when infeasible, certificate is None when solved.
 
     Attributes:
