@@ -170,6 +170,8 @@ def test_results_beyond_the_range_of_numbers_are_not_written(
         (["view", "slider_crank", "--speed", "nan"], "--speed = nan but must be positive"),
         (["loads", "slider_crank", "--motion", ""], "path = '' but must be the name"),
         (["score", "slider_crank", "--designs", ""], "path = '' but must be the name"),
+        (["score", "slider_crank", "--random", "9" * 400], "GB of memory"),
+        (["demo", "--samples", "3", "--period", "1e308"], "beyond what can be computed"),
         (["demo", "--out", ""], "path = '' but must be the name"),
     ],
 )

@@ -19,6 +19,7 @@ from fivebar_pin.errors import InvalidInputError
 __all__ = ["variations"]
 
 _BLOCK = 50_000  # designs at a time
+_BEYOND = 10**15  # designs that no machine holds
 _COPIES = 4  # of all designs that drawing, freezing and scoring them may hold at once
 
 
@@ -34,7 +35,7 @@ def variations(chain: ClosedChain, count: int, *, spread: float = 0.2, seed: int
     count = integer("count", count, least=1)
     if not 0.0 <= number("spread", spread) <= 0.9:
         raise InvalidInputError("spread", spread, "must lie between 0 and 0.9")
-    require_memory("count", count, _COPIES * count * chain.inertial_parameters.nbytes)
+    require_memory("count", count, _COPIES * min(count, _BEYOND) * chain.inertial_parameters.nbytes)
     rng = np.random.default_rng(integer("seed", seed))
     own = np.array(chain.inertial_parameters)
     P = pseudo_inertia(own)  # (nb, 4, 4)

@@ -47,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except MemoryError as error:
         return _refuse(program, f"there is not enough memory for this ({error}); ask for fewer samples or designs")
+    except OverflowError as error:  # Python's own numbers raise where arrays become infinite
+        return _refuse(program, f"the numbers given are beyond what can be computed ({error})")
     except OSError as error:  # those of files are told as errors of the family: what is left is the output stream
         _drop_output()
         return _refuse(program, f"the output cannot be written ({error.strerror or error})")

@@ -85,7 +85,10 @@ def _read(file: Path, chain: ClosedChain) -> Array:
     content = read_bounded(file, _MAX_DESIGN_BYTES)
     try:
         if file.suffix == ".npy":
-            return np.asarray(np.load(io.BytesIO(content), allow_pickle=False), dtype=np.float64)
+            given = np.load(io.BytesIO(content), allow_pickle=False)
+            if np.iscomplexobj(given):
+                raise FileFormatError(file, "cannot be read as designs (complex numbers)")
+            return np.asarray(given, dtype=np.float64)
         lines = content.decode("utf-8-sig").splitlines()
         heading = any(c.isalpha() and c not in "eE" for c in lines[0])
         table = np.loadtxt(lines, delimiter=",", skiprows=int(heading), ndmin=2)
