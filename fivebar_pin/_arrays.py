@@ -208,7 +208,7 @@ def finite(*, open: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], Callable
                 with np.errstate(all="ignore"):
                     result = compute(*args, **kwargs)
             except (np.linalg.LinAlgError, FloatingPointError, OverflowError) as error:
-                raise InvalidInputError(compute.__name__, str(error), _BEYOND, _SMALLER) from error
+                raise InvalidInputError(compute.__name__, str(error.args[-1]), _BEYOND, _SMALLER) from error
             _require_finite(compute.__name__, result, open)
             return result
 
@@ -217,7 +217,7 @@ def finite(*, open: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], Callable
     return decorate
 
 
-_BEYOND = "cannot be computed in double precision from these numbers"
+_BEYOND = "is beyond what can be computed in double precision"
 _SMALLER = "Check the units and sizes of what was given."
 
 
@@ -290,13 +290,14 @@ def integer(name: str, value: object, *, least: int = 0, most: int | None = None
     Raises:
         InvalidInputError: not an integer, less than `least`, or more than `most`.
     """
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
-    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]
-        bound = (
-            f" from {least} to {most}" if most is not None else f" of at least {least}" if least else ", not negative"
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidInputError(
+            name, value, f"must be an integer of at least {least}" + ("" if least else ", not negative")
         )
-        raise InvalidInputError(name, value, f"must be an integer{bound}")
-    return int(value)  # type: ignore[call-overload,no-any-return]
+    if most is not None and value > most:
+        shown = value if value < 10**18 else f"about 1e{len(str(int(value))) - 1}"
+        raise InvalidInputError(name, shown, f"must be an integer from {least} to {most}")
+    return int(value)
 
 
 def require_memory(name: str, value: object, needed: float) -> None:

@@ -274,12 +274,12 @@ def fault(code: int, out: str, err: str, before: dict[str, int], after: dict[str
 def tried(count: int, seed: int, place: Path, *, processes: bool = False) -> list[str]:
     """Try random command lines; return one report for each that ended wrongly."""
     workplace, faults = Workplace(place, seed), []
-    few_steps = {**simulation.simulate.__kwdefaults__, "max_steps": 200}  # a long simulation is no hang
+    few_steps = {**simulation.simulate.__wrapped__.__kwdefaults__, "max_steps": 200}  # a long simulation is no hang
     interrupt = mock.Mock(side_effect=KeyboardInterrupt)
     with contextlib.ExitStack() as stack:
         stack.enter_context(mock.patch.object(viz.Server, "wait", interrupt))
         stack.enter_context(mock.patch("webbrowser.open"))
-        stack.enter_context(mock.patch.object(simulation.simulate, "__kwdefaults__", few_steps))
+        stack.enter_context(mock.patch.object(simulation.simulate.__wrapped__, "__kwdefaults__", few_steps))
         stack.enter_context(_inside(place))
         for number in range(count):
             words = workplace.line()
