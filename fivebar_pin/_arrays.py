@@ -295,8 +295,7 @@ def integer(name: str, value: object, *, least: int = 0, most: int | None = None
             name, value, f"must be an integer of at least {least}" + ("" if least else ", not negative")
         )
     if most is not None and value > most:
-        shown = value if value < 10**18 else f"about 1e{len(str(int(value))) - 1}"
-        raise InvalidInputError(name, shown, f"must be an integer from {least} to {most}")
+        raise InvalidInputError(name, value, f"must be an integer from {least} to {most}")
     return int(value)
 
 
