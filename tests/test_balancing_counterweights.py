@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import balance_problems
 import mechanisms
 import numpy as np
 import pytest
 
 import fivebar_pin as fb
 from fivebar_pin import paper
-from fivebar_pin.balancing import Ball, Bar, Box, Design, Disc, Ellipsoid, Sphere, balance, balance_conditions, realise
+from fivebar_pin.balancing import (
+    Ball,
+    Bar,
+    Box,
+    Design,
+    Disc,
+    Ellipsoid,
+    Sphere,
+    balance,
+    balance_conditions,
+    balance_problem,
+    realise,
+)
 from fivebar_pin.balancing._parameters import pseudo_inertia
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, UnknownNameError
@@ -328,3 +341,22 @@ def test_bad_requests_are_refused_with_what_is_known() -> None:
         balance(chain, "force", mode="redesign", counterweight=STEEL)
     with pytest.raises(InfeasibleError, match="Farkas"):
         realise(balance(chain, "dynamic", region=Ball(0.1)))
+
+
+def test_discs_are_found_where_the_bound_lies_far_from_any() -> None:
+    """Moments that ask for bored discs, where only solid ones fit at the place of the bound: pieces are drawn in."""
+    rng = np.random.default_rng((21, 292))
+
+    case = balance_problems.draw(rng)
+    design = balance_problem(case.chain, case.kind, **case.arguments).solve(case.minimise)
+    assert design.status == "feasible" and design.gap < 2e-3 * design.objective
+    assert realise(design).attained
+
+
+def test_where_conditions_leave_no_material_the_empty_mechanism_is_the_design() -> None:
+    """A six-bar whose bodies may all vanish is reactionless without any, and with nothing else."""
+
+    case = balance_problems.draw(np.random.default_rng((21, 121)))
+    design = balance_problem(case.chain, case.kind, **case.arguments).solve(case.minimise)
+    assert design.feasible and not design.parameters.any()
+    assert 0.0 <= design.gap <= 1e-3 * design.objective

@@ -85,7 +85,7 @@ def test_a_count_is_a_whole_number(value):
     with pytest.raises(InvalidInputError, match=r"(?s)count = .* must be an integer of at least 0"):
         integer("count", value)
     assert integer("count", np.int16(3)) == 3
-    with pytest.raises(InvalidInputError, match="(?s)count = 10+ .* must be an integer from 0 to 100"):
+    with pytest.raises(InvalidInputError, match=r"(?s)count = 10+ .* must be an integer from 0 to 100"):
         integer("count", 10**400, most=100)
 
 

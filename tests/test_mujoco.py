@@ -172,8 +172,6 @@ def test_an_impossible_body_is_written_as_it_is() -> None:
     assert 'fullinertia="1 1 3 0 0 0"' in _mjcf_text._inertia(wrong).replace(".0", "")
 
 
-
-
 @pytest.mark.parametrize("mode", ["add", "redesign"])
 @pytest.mark.parametrize("name", PLANAR_OR_SPATIAL)
 def test_the_momentum_of_a_balanced_design_vanishes_in_mujoco_too(name: str, mode: str, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin.balancing._parameters import Space
-from fivebar_pin.balancing.design import Change, Design, change_of
+from fivebar_pin.balancing.design import PROVED, Change, Design, change_of
 from fivebar_pin.balancing.pieces import ARM, Piece, Sphere, density_of
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
@@ -24,9 +24,9 @@ from fivebar_pin.errors import SolverError
 _STEPS = 40  # designs tried until size and place of the pieces stay
 _SETTLED = 1e-6  # change of the objective from design to design [of its size]
 _STILL = 1e-5  # change of the arms from design to design [chain lengths]
-_ATTAINED = 1e-6  # gap at which a design counts as optimal [of the objective, or of the unit of its terms]
 _THIN = 1e-2  # least radius that bounds a piece from above: smaller ones only make the problem ill scaled [room]
 _GUESSED = 0.2  # the same where there was no piece [room]
+_FITS = 30  # designs tried until their pieces no longer stick out of their regions
 _PARTS = (1.0, 0.5, 0.25, 0.1, 0.02)  # shares of the way to new arms that are tried [-]
 _EAGER = 6  # steps that try the whole way; later ones go half of it until little is left, lest they go to and fro
 _NEAR = 1e-4  # change of the arms that is little [chain lengths]
@@ -53,6 +53,7 @@ class Maker(Immutable):
         pieces: what the material added to a body is made as, by its index.
         rooms: largest radius of a piece, by the index of its body [m].
         solve: gives the optimum for sizes, parameters (nb, 10) of arms, and bodies that get nothing.
+        fit: gives the design whose pieces stick out of their regions least, for the same.
     """
 
     chain: ClosedChain
@@ -60,6 +61,7 @@ class Maker(Immutable):
     pieces: Mapping[int, Piece]
     rooms: Mapping[int, float]
     solve: Callable[[Sizes, Array, frozenset[int]], Design]
+    fit: Callable[[Sizes, Array, frozenset[int]], Design]
     without: frozenset[int] = frozenset()
 
     def search(self) -> Design:
@@ -105,11 +107,30 @@ class Maker(Immutable):
                 return self._next(self._sizes(bound, guess), nothing)
             except SolverError as error:
                 problem = str(error)
+        found = self._fitted(bound)
+        if found is not None:
+            return found
         raise SolverError(
             f"no counterweights of this kind were found, nor a proof that there are none ({problem}). The problem "
             f"that bounds them from below has an optimum of {bound.objective:.6g}. Allow more reach, another "
             "material or more thickness."
         )
+
+    def _fitted(self, bound: Design) -> Design | None:
+        """Return a design that can be made, arms apart, found by letting pieces stick out ever less; None if it is not.
+
+        Size and place of pieces that stick out are those that the next ones are bounded about.
+        """
+        nothing, design = np.zeros((len(self.chain.joints), 10)), bound
+        for _ in range(_FITS):
+            try:
+                design = self.fit(self._sizes(design, None), nothing, self.without)
+                if not design.feasible:
+                    return None
+                return self._next(self._sizes(design, None), nothing)
+            except SolverError:
+                continue
+        return None
 
     def _settle(self, design: Design) -> tuple[Design, bool]:
         """Follow size, place and arms until they stay; return the last design and whether it can be made."""
@@ -154,7 +175,7 @@ class Maker(Immutable):
         bound = self.solve({}, self._parameters(design.arms), self.without)
         below = bound.dual_bound if bound.feasible else design.dual_bound
         scale = max(abs(design.objective), 1e-9 * self.chain.mass)
-        met = design.objective - below <= _ATTAINED * scale
+        met = design.objective - below <= PROVED * scale
         return replace(design, dual_bound=below, status="optimal" if met else "feasible")
 
     def _sizes(self, design: Design, guess: float | None) -> dict[int, Size]:
@@ -170,7 +191,7 @@ class Maker(Immutable):
             if guess is not None:
                 solid = outer_radius(piece, replace(change, inertia=np.zeros((3, 3))), axes)
                 r = min(r, solid + guess * max(0.0, room - solid))
-            r = float(np.clip(r, _THIN * room, room)) if change.mass > 0.0 else _GUESSED * room
+            r = max(r, _THIN * room) if change.mass > 0.0 else _GUESSED * room
             out[b] = Size(r / L, frozen(np.array(axes)[:2] @ change.place / L))
         return out
 

@@ -19,6 +19,7 @@ from fivebar_pin.balancing.regions import Shape
 from fivebar_pin.balancing.solvers import Block, svec
 
 _SPREAD = 0.3  # of the anchor's unit mass, as a share of the region (of the chain's length without one) [-]
+_FAR = 100.0  # how far an elastic piece may stick out [of the region's least half extent]
 _TWO, _FIVE_THIRDS = 2.0, 5.0 / 3.0  # powers of the mass in the least inertia of a flat piece and of a ball
 _RANK = 1e-9  # eigenvalue of a body's pseudo-inertia, as a share of the largest, that counts as flat [-]
 
@@ -32,6 +33,7 @@ class Bounds(Immutable):
         density: how dense it may be, or None for any.
         solid: the kind of piece it is to be made as, or None.
         point: in the plane, the centre c_0 (2,) about which the outer radius of `solid` is bounded from above.
+        elastic: whether `solid` may stick out of its region, by a variable of its own.
         taken_from: pseudo-inertia (4, 4) of the body that it is taken from, in the axes of the space, or None.
     """
 
@@ -39,6 +41,7 @@ class Bounds(Immutable):
     density: Density | None = None
     solid: Solid | None = None
     point: Array | None = None
+    elastic: bool = False
     taken_from: Array | None = None
 
 
@@ -55,6 +58,7 @@ class Material(Immutable):
         bounds: what is asked of it.
         size: number of variables.
         own: cones on its own variables.
+        overreach: which of its variables says how far an elastic piece sticks out, times its mass, or None.
         whole: whether a planar piece has all ten parameters as variables: what is taken from a body must leave one.
     """
 
@@ -66,6 +70,7 @@ class Material(Immutable):
     bounds: Bounds
     size: int
     own: tuple[Block, ...]
+    overreach: int | None
     whole: bool
 
     @property
@@ -162,7 +167,16 @@ def material(body: int, sign: int, start: int, label: str, bounds: Bounds, *, pl
     elif bounds.density is not None:
         forms.no_denser(label, bounds.density)
     return Material(
-        body, sign, start, planar, label, bounds, forms.cones.count, forms.cones.blocks(), bounds.taken_from is not None
+        body=body,
+        sign=sign,
+        start=start,
+        planar=planar,
+        label=label,
+        bounds=bounds,
+        size=forms.cones.count,
+        own=forms.cones.blocks(),
+        overreach=forms.overreach,
+        whole=bounds.taken_from is not None,
     )
 
 
@@ -172,6 +186,7 @@ class _Moments:
     def __init__(self, planar: bool, bounds: Bounds) -> None:
         self.planar = planar
         self.cones = Cones()
+        self.overreach: int | None = None
         d = 2 if planar else 3
         self.d = d
         c, spread = np.zeros(d), _SPREAD
@@ -301,6 +316,12 @@ class _Moments:
                 self.cones.add(f"{text} of bounded size", "nonneg", [w - outer], np.ones(1))
         if solid.across is not None:
             self.cones.add(f"{label} lies on its line", "zero", [self.first(solid.across)], np.zeros(1))
+        if bounds.elastic:
+            room = float(bounds.shape.semi_axes.min())
+            self.overreach = self.cones.count
+            out = self.cones.variable(0.5 * room)
+            self.cones.add(f"{label} sticks out", "nonneg", [out, _FAR * room * self.m - out], np.array([1.0, 1.0]))
+            w = w - out
         self._reach(f"{label} lies in its region as a whole", bounds.shape, w)
 
     def _ball(self, text: str, solid: Solid, w: Array) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, reals
+from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing._quantities import Rows, reflected_inertia
 from fivebar_pin.balancing._setup import Setup
 from fivebar_pin.balancing._terms import (
@@ -28,6 +29,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 
+OVERREACH = "overreach"  # of counterweights that may stick out of their regions, on the way to some that do not
 _HEAVIEST = 1e30  # weight of a term: products with it do not overflow [-]
 
 
@@ -85,6 +87,16 @@ def _weighed(weight: Array, now: float, pi: Array) -> float:
 def _distance(setup: Setup, pi: Array) -> float:
     away = setup.space.of(pi - setup.chain.inertial_parameters).reshape(-1) / setup.unit
     return float(np.linalg.norm(away))
+
+
+def overreach(materials: Sequence[Material], n: int) -> Term:
+    """Return how far all elastic pieces stick out of their regions together, times their masses, scaled.
+
+    It is no property of the bodies, and counts as nothing once they are made.
+    """
+    row = np.zeros(n)
+    row[[m.start + m.overreach for m in materials if m.overreach is not None]] = 1.0
+    return linear_term(OVERREACH, row, 0.0, 1.0, lambda pi: 0.0)
 
 
 def weights_of(minimise: str | Mapping[str, float] | None, mode: str) -> dict[str, float]:

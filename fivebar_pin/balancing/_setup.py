@@ -114,6 +114,8 @@ class Setup(Immutable):
         counterweight: Piece | Mapping[str, Piece] | None,
         density: tuple[float, float] | None,
         sizes: Sizes,
+        *,
+        elastic: bool = False,
     ) -> list[Material]:
         """Return the pieces of material that are variables.
 
@@ -122,6 +124,7 @@ class Setup(Immutable):
             region, counterweight: where material may lie and what it is made as, for all bodies or by name.
             density: of all material that is not a counterweight [kg/m3], and its thickness [m]; None for any.
             sizes: by body, about which counterweights are bounded in size from above; others from below.
+            elastic: whether counterweights may stick out of their regions.
         """
         self._check_names(region, "region")
         self._check_names(counterweight, "counterweight")
@@ -130,6 +133,7 @@ class Setup(Immutable):
         for bodies, sign, label in ((chosen, 1, word), (removable, -1, "material removed from")):
             for b in bodies:
                 own = self._bounds_of(b, sign, region, counterweight, density, sizes)
+                own = replace(own, elastic=elastic and own.solid is not None)
                 made = material(b, sign, start, f"{label} {self.chain.joints[b]}", own, planar=self.space.planar)
                 out.append(made)
                 start += made.size
@@ -178,7 +182,8 @@ class Setup(Immutable):
         if density is not None:
             bound = density_bound(*density, planar=space.planar, mass=self.mass, length=space.length)
         taken = self._taken(b) if sign < 0 else None
-        return Bounds(shape, bound, solid, None if size is None else size.center, taken)
+        center = None if size is None else size.center
+        return Bounds(shape, bound, solid, center, taken_from=taken)
 
     def _taken(self, b: int) -> Array:
         """Return the body that material is taken from, which must exist in space and not only in the plane."""

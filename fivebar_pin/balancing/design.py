@@ -23,6 +23,7 @@ from fivebar_pin.errors import InfeasibleError
 if TYPE_CHECKING:
     from fivebar_pin.balancing._given import Given
 
+PROVED = 1e-5  # gap at which a design counts as optimal [of the objective or its typical size]
 __all__ = ["Certificate", "Change", "Design"]
 
 

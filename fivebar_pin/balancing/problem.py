@@ -24,17 +24,18 @@ from fivebar_pin.balancing import _empty, _extent, _lift
 from fivebar_pin.balancing._given import Given
 from fivebar_pin.balancing._making import Maker, Sizes
 from fivebar_pin.balancing._material import Material
-from fivebar_pin.balancing._objective import TermMaker, weights_of
+from fivebar_pin.balancing._objective import OVERREACH, TermMaker, overreach, weights_of
 from fivebar_pin.balancing._parameters import Space
 from fivebar_pin.balancing._quantities import MEASURES, Motions, Rows, measure, trajectories
 from fivebar_pin.balancing._sampling import SpaceName, random_samples, space_of
 from fivebar_pin.balancing._setup import MassBounds, Setup
 from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, positive_limit
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, conditions_for
-from fivebar_pin.balancing.design import Asked, Design
+from fivebar_pin.balancing.design import PROVED, Asked, Design
 from fivebar_pin.balancing.pieces import THICKNESS, Piece, density_of, positive
 from fivebar_pin.balancing.regions import Region
 from fivebar_pin.balancing.solvers import DEFAULT, SECOND, Block, Certificate, Outcome, Program, solve, solver_named
+from fivebar_pin.balancing.solvers.cones import outside
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
@@ -42,7 +43,7 @@ __all__ = ["BalanceProblem", "balance_problem"]
 
 _MARGINS = (1e-9, 1e-8, 1e-7, 1e-6)  # how far inside the cones a design is kept, as a share of the moving mass
 _GIVE = ((1e-9, 1e-8), (1e-8, 1e-7))  # margin, and how far regions give way where nothing else is left, the same
-_PROVED = 1e-5  # gap at which a design counts as optimal; a wider one is for the second solver [of its typical size]
+_ROUGH = 1e-3  # residual of a rough answer, and gap that it may leave to the design without material [-]
 _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
 _FELT = 1e-12  # factor of an inertia that counts as zero in the conditions and terms of a scaled problem [-]
@@ -60,6 +61,10 @@ class _Task:
     weights: Mapping[str, float]
     limits: tuple[Block, ...]
     solver: str
+
+    def size(self, design: Design) -> float:
+        """Return the size of the objective that gaps are measured by."""
+        return max(abs(design.objective), self.unit)
 
     def solve(self, *, margin: float = 0.0, give: float = 0.0) -> Outcome:
         """Solve; where the default solver has no acceptable answer, the other one is asked before giving up."""
@@ -161,12 +166,17 @@ class BalanceProblem(Immutable):
         if not self.pieces:
             return replace(self._optimum(weights, further), asked=asked)
 
-        def solved(sizes: Sizes, arms: Array, without: frozenset[int]) -> Design:
-            kept = tuple(b for b in self.given.bodies if b not in without)
-            return assembled(replace(self.given, bodies=kept), sizes, arms)._optimum(weights, further)
+        def without(bodies: frozenset[int]) -> Given:
+            return replace(self.given, bodies=tuple(b for b in self.given.bodies if b not in bodies))
+
+        def solved(sizes: Sizes, arms: Array, left: frozenset[int]) -> Design:
+            return assembled(without(left), sizes, arms)._optimum(weights, further)
+
+        def fitted(sizes: Sizes, arms: Array, left: frozenset[int]) -> Design:
+            return assembled(without(left), sizes, arms, elastic=True)._optimum({OVERREACH: 1.0}, further)
 
         rooms = {m.body: m.room * self.space.length for m in self.materials if m.sign > 0}
-        design = Maker(self.chain, self.space, self.pieces, rooms, solved).search()
+        design = Maker(self.chain, self.space, self.pieces, rooms, solved, fitted).search()
         named = {self.chain.joints[b]: piece for b, piece in self.pieces.items()}
         return replace(design, asked=asked, pieces=named)
 
@@ -179,6 +189,36 @@ class BalanceProblem(Immutable):
         P, q, unit, epigraphs, sizes = self._objective(weights)
         program = Program(P.size, [*bounds, *self.caps, *epigraphs], sizes)
         asked = _Task(program, P, q, unit, weights, tuple(limited), self.given.solver)
+        failure = SolverError("the problem was not solved")
+        for solver in dict.fromkeys((asked.solver, SECOND)):
+            try:
+                return self._answer(replace(asked, solver=solver), bounds)
+            except SolverError as error:
+                if isinstance(error.__cause__, ImportError):  # a solver that is missing is to be installed
+                    raise
+                failure = error
+        design = self._no_material(asked, bounds)
+        if design is None:
+            raise failure
+        return design
+
+    def _no_material(self, asked: _Task, bounds: Sequence[Block]) -> Design | None:
+        """Return the design without any material, where it is one and a rough answer proves it all but optimal.
+
+        Conditions can leave nothing else, at the apex of all cones, where no solver comes to an end.
+        """
+        if max((outside(b.cone, b.g) for b in bounds), default=0.0) > _EXACT:
+            return None
+        try:
+            rough = solve(asked.program, asked.P, asked.q, tolerance=_ROUGH, solver=asked.solver)
+        except SolverError:
+            return None
+        design, _ = self._finish(replace(rough, x=np.zeros(asked.P.size)), asked)
+        near = design is not None and design.gap <= _ROUGH * asked.size(design)
+        return _graded(design, asked) if design is not None and near else None
+
+    def _answer(self, asked: _Task, bounds: Sequence[Block]) -> Design:
+        """Return what one solver makes of it."""
         design = self._inside(asked)
         if design is not None:
             return self._closer(design, asked)
@@ -190,13 +230,12 @@ class BalanceProblem(Immutable):
 
     def _closer(self, design: Design, asked: _Task) -> Design:
         """Return the better of two solvers' designs, with the better bound, where the first leaves a gap."""
-        size = max(abs(design.objective), asked.unit)
-        if design.gap > _PROVED * size and asked.solver != SECOND:
+        if design.gap > PROVED * asked.size(design) and asked.solver != SECOND:
             other = self._inside(replace(asked, solver=SECOND))
             if other is not None:
                 below = max(design.dual_bound, other.dual_bound)
                 design = replace(min(design, other, key=lambda d: d.objective), dual_bound=below)
-        return design if design.gap <= _PROVED * size else replace(design, status="feasible")
+        return _graded(design, asked)
 
     def _inside(self, asked: _Task) -> Design | None:
         """Return the design that is kept a hair inside the cones, by the least margin that makes it physical."""
@@ -345,6 +384,11 @@ class BalanceProblem(Immutable):
         )
 
 
+def _graded(design: Design, asked: _Task) -> Design:
+    """Call a design optimal where its bound says so."""
+    return design if design.gap <= PROVED * asked.size(design) else replace(design, status="feasible")
+
+
 def balance_problem(
     chain: ClosedChain,
     kind: str | None = "force",
@@ -425,19 +469,22 @@ def stuff(chain: ClosedChain, material: str | float | None, thickness: float | N
     return None if material is None else (density_of(material), thick)
 
 
-def assembled(given: Given, sizes: Sizes | None = None, arms: Array | None = None) -> BalanceProblem:
+def assembled(
+    given: Given, sizes: Sizes | None = None, arms: Array | None = None, *, elastic: bool = False
+) -> BalanceProblem:
     """Put the problem together.
 
     Args:
         given: what it is made from.
         sizes: by index of the body, about which its counterweight is bounded in size from above; from below without.
         arms: inertial parameters (nb, 10) of arms that are part of the bodies; none unless given.
+        elastic: whether counterweights may stick out of their regions, which then is a term that can be minimised.
     """
     chain, space = given.chain, given.space
     arms = np.zeros((len(chain.joints), 10)) if arms is None else arms
     setup = Setup(chain, space, given.conditions, given.mode, arms)
     materials = setup.materials(
-        given.bodies, given.removable, given.region, given.counterweight, given.density, sizes or {}
+        given.bodies, given.removable, given.region, given.counterweight, given.density, sizes or {}, elastic=elastic
     )
     E, X0 = setup.map(materials)
     full_E = _lift.linear(chain, space, setup.mass, materials)
@@ -447,6 +494,9 @@ def assembled(given: Given, sizes: Sizes | None = None, arms: Array | None = Non
     full_0 = present.reshape(-1)
     n = E.shape[1]
     maker = TermMaker(chain, setup, dict(given.rows), given.paths, E, X0, full_E, full_0)
+    terms = {name: maker.make(name) for name in given.objectives}
+    if elastic:
+        terms[OVERREACH] = overreach(materials, n)
     limited = maker.limits(given.limits)
     blocks, caps = setup.constraints(materials, E, X0, given.masses), tuple(setup.caps(materials, given.masses, n))
     gone = _empty.empty(blocks, materials, n)
@@ -458,7 +508,7 @@ def assembled(given: Given, sizes: Sizes | None = None, arms: Array | None = Non
         mode=given.mode,
         materials=tuple(materials),
         gone=gone,
-        terms={name: maker.make(name) for name in given.objectives},
+        terms=terms,
         rows=dict(given.rows),
         limits=dict(given.limits),
         E=frozen(E),
