@@ -313,7 +313,7 @@ def test_designs_that_exist_only_as_points_and_sheets_are_found(region: Ball | B
     """mcy(arm) = 0 and mcx(rod_swing) = 0 on the border of a region: flat material, no volume to solve in."""
     design = balance(delta(), "force", region=region, material=None, solver=solver)
     assert design.feasible
-    assert abs(design.gap) < 1e-7
+    assert abs(design.gap) < 1e-6
     physical(design)
 
 
