@@ -88,7 +88,7 @@ def run_balance(chosen: argparse.Namespace) -> int:
         piece = _piece(chosen, chain)
         design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, counterweight=piece, **options)
     if not design.feasible:
-        console.print(repr(design), markup=False, soft_wrap=True)
+        _print_refusal(console, design)
         return 1
     made = realise(design) if chosen.realise else None
     after = design.chain if made is None else made.chain
@@ -236,6 +236,22 @@ def _title(design: Any) -> str:
 
 def _balance(design: Any) -> str:
     return f"{design.kind} balance" + ("" if design.branch is None else " on the branch of the motion")
+
+
+def _print_refusal(console: Any, design: Any) -> None:
+    """Say that there is no design, with the proof, and what the material was."""
+    lines = [
+        f"{design.original.name}: infeasible, no {design.kind} balance within the bounds.",
+        f"Proof: {design.certificate}",
+    ]
+    if design.material:
+        lines.append(f"Material: {design.material}; --material none asks for any density.")
+    for q in design.alternatives:
+        lines.append(
+            f"It is possible on the branch of {q.round(6).tolist()} alone: --branch motion, with a motion there."
+        )
+    for line in lines:
+        console.print(line, markup=False, soft_wrap=True)
 
 
 def _print_realised(console: Any, made: Any) -> None:
