@@ -23,7 +23,7 @@ from fivebar_pin.dynamics import inverse_dynamics
 PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # order of the inertia entries in ten parameters
 CAP = 10.0  # the documented bound on an added mass that has none of its own [moving masses]
 SAMPLES = 17
-TIGHT = {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9}  # bounds on density are small numbers
+TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}  # bounds on density are small numbers
 
 
 @dataclass(frozen=True, eq=False)

@@ -416,3 +416,9 @@ def test_a_solver_that_is_not_installed_names_its_package(monkeypatch: pytest.Mo
     monkeypatch.setitem(sys.modules, "clarabel", None)
     with pytest.raises(SolverError, match="pip install clarabel"):
         balance(case_I()[0], "force")
+
+
+@pytest.mark.parametrize("region", [Ball(1e308), Ball(0.1, (1e200, 0.0, 0.0)), Box((1e300, 1.0, 1.0))], ids=str)
+def test_regions_beyond_what_can_be_told_from_round_off_are_refused(region: Ball | Box) -> None:
+    with pytest.raises(InvalidInputError, match=r"region of body .* must lie within 60000 m"):
+        balance(case_I()[0], "force", region=region)

@@ -17,7 +17,7 @@ from fivebar_pin.balancing._parameters import pseudo_inertia
 COUNT = int(os.environ.get("FIVEBAR_PIN_RANDOM_PROBLEMS", "16"))
 SEED = int(os.environ.get("FIVEBAR_PIN_RANDOM_SEED", "7"))
 AGREE = 1e-5  # largest difference to cvxpy's optimum [of the optimum or its typical size]
-ROUGHLY = 1e-3  # the same where cvxpy calls its own answer inaccurate
+ROUGHLY = 2e-3  # the same where cvxpy calls its own answer inaccurate
 GAP = 1e-5  # largest gap that is left [the same]
 BODY = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
 
@@ -39,7 +39,7 @@ def test_a_random_problem_ends_as_an_independent_program_says(k: int) -> None:
         assert design.objective == pytest.approx(optimum, abs=agree * size), case
         assert design.gap <= GAP * size, case
     else:
-        assert design.pieces or not design.parameters.any(), case
+        assert design.pieces or design.gap <= ROUGHLY * size, case
     assert design.residual < 1e-13
     left = [case.chain.inertial_parameters[case.chain.joints.index(c.body)] - c.parameters for c in design.removed]
     for pi in (*design.parameters, *left, *(c.parameters for c in (*design.added, *design.removed))):

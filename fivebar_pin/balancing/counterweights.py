@@ -344,12 +344,13 @@ def _overhang(design: Design, b: int, place: Array, radius: float) -> float:
     assert design.asked is not None
     given, chain, space = design.asked.given, design.original, design.space
     own = given.region.get(chain.joints[b]) if isinstance(given.region, Mapping) else given.region
-    shape = resolve(own or Ball(chain.length), chain, b, space.axes[b], planar=space.planar, unit=1.0)
+    L = chain.length
+    shape = resolve(own or Ball(L), chain, b, space.axes[b], planar=space.planar, unit=L)
     center = np.array(space.axes[b])[:2] @ place if space.planar else place
-    off = shape.axes @ (center - shape.center)
+    off = L * (shape.axes @ (center / L - shape.center))
     away = off / np.linalg.norm(off) if off.any() else np.eye(off.size)[0]
     points = off + radius * np.vstack([_directions(off.size), away, np.eye(off.size), -np.eye(off.size)])
-    semi = shape.semi_axes
+    semi = L * shape.semi_axes
     if shape.kind == "box":
         return max(0.0, float((np.abs(points) - semi).max()))
     return max(0.0, float((np.linalg.norm(points / semi, axis=1).max() - 1.0) * semi.min()))

@@ -226,7 +226,7 @@ class BalanceProblem(Immutable):
         if outcome.x is None:
             return self._infeasible(self._proof(bounds) or outcome.certificate)
         design, problem = self._finish(outcome, asked)
-        return design or self._on_the_boundary(asked, problem)
+        return _graded(design or self._on_the_boundary(asked, problem), asked)
 
     def _closer(self, design: Design, asked: _Task) -> Design:
         """Return the better of two solvers' designs, with the better bound, where the first leaves a gap."""

@@ -93,6 +93,7 @@ class Ellipsoid(Immutable):
 
 
 Region = Ball | Box | Ellipsoid
+_FAR = 1e6  # how far out a region may lie or reach: beyond, nothing can be told from round-off [chain lengths]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +131,13 @@ def resolve(region: Region, chain: ClosedChain, body: int, axes: Array, *, plana
     center = p + R @ np.asarray(region.center)
     kind = type(region).__name__.lower()
     semi = np.asarray(region.semi_axes, dtype=np.float64)
+    farthest = float(max(np.abs(center).max(), semi.max()))
+    if not farthest <= _FAR * unit:
+        raise InvalidInputError(
+            f"region of body {chain.joints[body]}",
+            farthest,
+            f"must lie within {_FAR * unit:g} m, {_FAR:g} x the mechanism",
+        )
     if not planar:
         return Shape(kind, frozen(center / unit), frozen(R.T), frozen(semi / unit))
     flat = axes[:2] @ center / unit
