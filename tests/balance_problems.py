@@ -7,6 +7,7 @@ library's cones is used. A new argument is drawn in one place and written in one
 
 from __future__ import annotations
 
+import contextlib
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -137,9 +138,11 @@ def decided(case: Case, conditions: BalanceConditions | None, *, solver: str = "
     problem = cp.Problem(cp.Minimize(written.cost), written.constraints)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of inaccurate solutions: the status says so too
-        try:
-            problem.solve(solver=solver, **(TIGHT if solver == "CLARABEL" else {}))
-        except cp.error.SolverError:
+        for settings in (TIGHT, {}) if solver == "CLARABEL" else ({},):
+            with contextlib.suppress(cp.error.SolverError):
+                problem.solve(solver=solver, **settings)
+                break
+        else:
             return "unsolved", float("nan"), written.size()
     return problem.status, float("inf") if problem.value is None else float(problem.value), written.size()
 

@@ -47,4 +47,4 @@ def test_a_random_problem_ends_as_an_independent_program_says(k: int) -> None:
     if design.pieces:
         made = realise(design)
         assert made.attained, case
-        assert all(w.overhang <= 1e-6 * case.chain.length for w in made.weights), case
+        assert all(w.overhang <= 2e-5 * case.chain.length for w in made.weights), case

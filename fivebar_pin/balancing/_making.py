@@ -21,24 +21,32 @@ from fivebar_pin.balancing.pieces import ARM, Piece, Sphere, density_of
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
 
-_STEPS = 40  # designs tried until size and place of the pieces stay
+_STEPS = 60  # designs tried until size and place of the pieces stay
 _SETTLED = 1e-6  # change of the objective from design to design [of its size]
 _STILL = 1e-5  # change of the arms from design to design [chain lengths]
-_THIN = 1e-2  # least radius that bounds a piece from above: smaller ones only make the problem ill scaled [room]
+_MADE = 1e-4  # gap between an arm and the rim of its piece with which it can be made [chain lengths]
+_THIN = 1e-3  # least radius that bounds a piece from above: smaller ones only make the problem ill scaled [room]
 _GUESSED = 0.2  # the same where there was no piece [room]
 _FITS = 30  # designs tried until their pieces no longer stick out of their regions
 _PARTS = (1.0, 0.5, 0.25, 0.1, 0.02)  # shares of the way to new arms that are tried [-]
 _EAGER = 6  # steps that try the whole way; later ones go half of it until little is left, lest they go to and fro
+_FREE = 20  # steps after which pieces must stay ever nearer to where they were, so that they come to rest
+_STRAY, _TIGHTER = 0.3, 0.65  # how far they may stray then [room], and what each step leaves of it [-]
+_TRIED = 3  # bodies that are tried without a counterweight
 _NEAR = 1e-4  # change of the arms that is little [chain lengths]
 _GUESSES = (1.0, 0.5, 0.25, 0.75, 0.1)  # first sizes tried, between the solid piece and all the room there is [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Size(Immutable):
-    """Outer radius and centre (2,) about which a piece is bounded from above, in chain lengths."""
+    """Outer radius and centre (2,) or (3,) about which a piece is bounded from above, in chain lengths.
+
+    Where `stray` is given, the centre stays within that distance.
+    """
 
     radius: float
     center: Array
+    stray: float | None = None
 
 
 Sizes = Mapping[int, Size]  # by index of the body
@@ -53,6 +61,7 @@ class Maker(Immutable):
         pieces: what the material added to a body is made as, by its index.
         rooms: largest radius of a piece, by the index of its body [m].
         solve: gives the optimum for sizes, parameters (nb, 10) of arms, and bodies that get nothing.
+        unit: typical size of the objective.
         fit: gives the design whose pieces stick out of their regions least, for the same.
     """
 
@@ -62,6 +71,7 @@ class Maker(Immutable):
     rooms: Mapping[int, float]
     solve: Callable[[Sizes, Array, frozenset[int]], Design]
     fit: Callable[[Sizes, Array, frozenset[int]], Design]
+    unit: float
     without: frozenset[int] = frozenset()
 
     def search(self) -> Design:
@@ -73,28 +83,41 @@ class Maker(Immutable):
         Raises:
             SolverError: neither a design nor a proof.
         """
-        bound = self.solve({}, np.zeros((len(self.chain.joints), 10)), self.without)
-        if not bound.feasible:
-            return bound
-        last, settled = self._settle(self._first(bound))
-        best = self._stated(last) if settled else None
-        for b in self._light(last):
-            try:
-                other = replace(self, without=self.without | {b}).search()
-            except SolverError:
-                continue
-            if other.feasible and (best is None or other.objective < best.objective):
-                return other
+        best, last, failure = self._one()
+        if best is not None and not best.feasible:
+            return best
+        for b in self._light(last)[:_TRIED]:
+            if len(self.without) + 1 < len(self.pieces):
+                other, _, _ = replace(self, without=self.without | {b})._one()
+                if other is not None and other.feasible and (best is None or other.objective < best.objective):
+                    return replace(self, without=self.without | {b}).search()
         if best is None:
-            raise SolverError(
+            raise failure
+        return best
+
+    def _one(self) -> tuple[Design | None, Design | None, SolverError]:
+        """Return the design for these bodies or the proof, the last one tried, and why there is none of both."""
+        last, failure = None, SolverError("no counterweights were tried")
+        try:
+            bound = self.solve({}, np.zeros((len(self.chain.joints), 10)), self.without)
+            if not bound.feasible:
+                return bound, None, failure
+            last, settled = self._settle(self._first(bound))
+            if settled:
+                return self._stated(last), last, failure
+            failure = SolverError(
                 f"size and place of the counterweights do not settle in {_STEPS} steps. The problem that bounds them "
                 f"from below has an optimum of {bound.objective:.6g}. Allow more reach, another material, more "
                 "thickness or thinner arms."
             )
-        return best
+        except SolverError as error:
+            failure = error
+        return None, last, failure
 
-    def _light(self, design: Design) -> list[int]:
+    def _light(self, design: Design | None) -> list[int]:
         """Return the bodies whose arms outweigh their counterweights, the lightest of these first."""
+        if design is None:
+            return []
         mass = {c.body: c.mass for c in design.added}
         light = sorted((mass[a.body], a.body) for a in design.arms if mass[a.body] < a.mass)
         return [self.chain.joints.index(name) for _, name in light]
@@ -134,30 +157,33 @@ class Maker(Immutable):
 
     def _settle(self, design: Design) -> tuple[Design, bool]:
         """Follow size, place and arms until they stay; return the last design and whether it can be made."""
-        carried = np.zeros((len(self.chain.joints), 10))
-        whole = still = False
+        carried, kept = np.zeros((len(self.chain.joints), 10)), None
         for step in range(_STEPS):
             arms = self.arms(design)
             whole_way = step < _EAGER or self._moved(arms, design.arms) < _NEAR * self.chain.length
+            stray = None if step < _FREE else _STRAY * _TIGHTER ** (step - _FREE)
             try:
                 parts = _PARTS if whole_way else _PARTS[1:]
-                following, carried = self._toward(design, carried, self._parameters(arms), parts)
+                following, carried = self._toward(design, carried, arms, parts, stray)
             except SolverError:
-                return replace(design, arms=arms), False
-            whole = np.array_equal(carried, self._parameters(arms))
-            still = self._moved(self.arms(following), arms) <= _STILL * self.chain.length
-            size = max(abs(following.objective), 1e-12)
+                break
+            moved = self._moved(self.arms(following), arms)
+            size = max(abs(following.objective), self.unit)
             settled = abs(design.objective - following.objective) <= _SETTLED * size
             design = replace(following, arms=arms)
-            if whole and still and settled:
-                return design, True
-        return design, whole and still  # it can be made as it is; its gap says how much better another might be
+            if np.array_equal(carried, self._parameters(arms)) and moved <= _MADE * self.chain.length:
+                kept = design
+                if settled and moved <= _STILL * self.chain.length:
+                    return design, True
+        return (design, False) if kept is None else (kept, True)  # its gap says how much better another might be
 
-    def _toward(self, design: Design, now: Array, arms: Array, parts: Sequence[float]) -> tuple[Design, Array]:
+    def _toward(
+        self, design: Design, now: Array, arms: Sequence[Change], parts: Sequence[float], stray: float | None
+    ) -> tuple[Design, Array]:
         """Return the next design with the arms asked for, or as far on the way there as there is a design."""
-        sizes, problem = self._sizes(design, None), ""
+        sizes, wanted, problem = self._sizes(design, None, stray), self._parameters(arms), ""
         for part in parts:
-            carried = arms if part == 1.0 else now + part * (arms - now)
+            carried = wanted if part == 1.0 else now + part * (wanted - now)
             try:
                 return self._next(sizes, carried), carried
             except SolverError as error:
@@ -174,25 +200,26 @@ class Maker(Immutable):
         """Return the design with the bound on all designs with these arms, and what it can claim."""
         bound = self.solve({}, self._parameters(design.arms), self.without)
         below = bound.dual_bound if bound.feasible else design.dual_bound
-        scale = max(abs(design.objective), 1e-9 * self.chain.mass)
+        scale = max(abs(design.objective), self.unit)
         met = design.objective - below <= PROVED * scale
         return replace(design, dual_bound=below, status="optimal" if met else "feasible")
 
-    def _sizes(self, design: Design, guess: float | None) -> dict[int, Size]:
+    def _sizes(self, design: Design, guess: float | None, stray: float | None = None) -> dict[int, Size]:
         """Return sizes and places of a design's pieces; with a guess, within the room that there is."""
         out = {}
         by_name = {c.body: c for c in design.added}
         for b, piece in self.pieces.items():
-            if isinstance(piece, Sphere) or b in self.without:
+            if b in self.without:
                 continue
             change, axes, L = by_name[self.chain.joints[b]], self.space.axes[b], self.space.length
             room = self.rooms[b]
             r = outer_radius(piece, change, axes)
-            if guess is not None:
+            if guess is not None and not isinstance(piece, Sphere):
                 solid = outer_radius(piece, replace(change, inertia=np.zeros((3, 3))), axes)
                 r = min(r, solid + guess * max(0.0, room - solid))
             r = max(r, _THIN * room) if change.mass > 0.0 else _GUESSED * room
-            out[b] = Size(r / L, frozen(np.array(axes)[:2] @ change.place / L))
+            rows = np.array(axes)[:2] if self.space.planar else np.eye(3)
+            out[b] = Size(r / L, frozen(rows @ change.place / L), None if stray is None else stray * room / L)
         return out
 
     def arms(self, design: Design) -> tuple[Change, ...]:
@@ -235,7 +262,7 @@ def outer_radius(piece: Piece, change: Change, axes: Array) -> float:
 
 
 def arm_width(piece: Piece, radius: float) -> float:
-    """Return the width of the arm of a piece of an outer radius [m]."""
+    """Return the width and thickness of the arm of a piece of an outer radius [m]."""
     return ARM * radius if piece.arm is None else piece.arm
 
 
@@ -248,12 +275,11 @@ def arm_of(piece: Piece, change: Change, axes: Array, planar: bool) -> Change | 
     reach = distance - radius
     if width == 0.0 or change.mass <= 0.0 or reach <= 0.0:
         return None
-    thickness = width if isinstance(piece, Sphere) else piece.thickness
-    mass = density_of(piece.density) * width * thickness * reach
+    mass = density_of(piece.density) * width**2 * reach
     x = flat / distance
     z = axes[2] if planar else across(x)
     turn = np.column_stack([x, np.cross(z, x), z])
-    squares = np.array([reach, width, thickness]) ** 2
+    squares = np.array([reach, width, width]) ** 2
     own = turn @ np.diag(mass / 12.0 * (squares.sum() - squares)) @ turn.T
     place = 0.5 * reach * x + (change.place - flat)
     return change_of(change.body, np.array(pin.Inertia(mass, place, own).toDynamicParameters()))

@@ -20,6 +20,7 @@ from fivebar_pin.balancing.solvers import Block, svec
 
 _SPREAD = 0.3  # of the anchor's unit mass, as a share of the region (of the chain's length without one) [-]
 _FAR = 100.0  # how far an elastic piece may stick out [of the region's least half extent]
+_INSIDE = 1.0 - 1e-6  # share of a region that a piece to be made is solved for, lest round-off make it stick out
 _TWO, _FIVE_THIRDS = 2.0, 5.0 / 3.0  # powers of the mass in the least inertia of a flat piece and of a ball
 _RANK = 1e-9  # eigenvalue of a body's pseudo-inertia, as a share of the largest, that counts as flat [-]
 
@@ -32,7 +33,8 @@ class Bounds(Immutable):
         shape: region, scaled, or None for anywhere.
         density: how dense it may be, or None for any.
         solid: the kind of piece it is to be made as, or None.
-        point: in the plane, the centre c_0 (2,) about which the outer radius of `solid` is bounded from above.
+        point: the centre c_0 (2,) or (3,) about which the outer radius of `solid` is bounded from above.
+        stray: how far the centre of `solid` may be from `point` [chain lengths], or None for any distance.
         elastic: whether `solid` may stick out of its region, by a variable of its own.
         taken_from: pseudo-inertia (4, 4) of the body that it is taken from, in the axes of the space, or None.
     """
@@ -41,6 +43,7 @@ class Bounds(Immutable):
     density: Density | None = None
     solid: Solid | None = None
     point: Array | None = None
+    stray: float | None = None
     elastic: bool = False
     taken_from: Array | None = None
 
@@ -322,7 +325,13 @@ class _Moments:
             out = self.cones.variable(0.5 * room)
             self.cones.add(f"{label} sticks out", "nonneg", [out, _FAR * room * self.m - out], np.array([1.0, 1.0]))
             w = w - out
-        self._reach(f"{label} lies in its region as a whole", bounds.shape, w)
+        if bounds.point is not None and bounds.stray is not None:
+            off = [h - float(c) * self.m for h, c in zip(self.h, bounds.point, strict=True)]
+            self.cones.add(f"{label} stays near", "soc", [bounds.stray * self.m, *off])
+        within = bounds.shape
+        if bounds.point is not None:
+            within = replace(within, semi_axes=_INSIDE * within.semi_axes)
+        self._reach(f"{label} lies in its region as a whole", within, w)
 
     def _ball(self, text: str, solid: Solid, w: Array) -> None:
         """Ask for S_c >= least m^(5/3) in every direction and w >= beta m^(4/3)."""

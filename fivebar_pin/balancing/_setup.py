@@ -183,7 +183,8 @@ class Setup(Immutable):
             bound = density_bound(*density, planar=space.planar, mass=self.mass, length=space.length)
         taken = self._taken(b) if sign < 0 else None
         center = None if size is None else size.center
-        return Bounds(shape, bound, solid, center, taken_from=taken)
+        stray = None if size is None else size.stray
+        return Bounds(shape, bound, solid, center, stray, taken_from=taken)
 
     def _taken(self, b: int) -> Array:
         """Return the body that material is taken from, which must exist in space and not only in the plane."""

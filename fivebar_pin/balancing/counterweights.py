@@ -36,8 +36,10 @@ __all__ = ["Counterweight", "Realisation", "realise"]
 SHAPES: Mapping[str, type[Piece]] = {"disc": Disc, "bar": Bar, "ball": Sphere}
 COLOUR = (0.86, 0.36, 0.10, 1.0)  # of every counterweight: by it the viewer knows them, in files too
 _SAME = 1e-6  # difference of realised and promised terms that counts as none [of the term or its size before]
+_FITS = 2e-5  # length that a piece may stick out of its region, for round-off [chain lengths]
+_SHOWN = 1e-3  # the same that is worth a word [radii of the piece]
 _EXACT = 1e-9  # residual of the conditions that counts as balanced [of the moving mass]
-_BORED = 1e-6  # bore below this share of the area is not drilled [-]
+_BORED = 1e-5  # bore below this share of the area is not drilled [-]
 _RIM = 720  # points of a rim that are asked whether they lie in the region
 
 
@@ -78,7 +80,8 @@ class Counterweight(Immutable):
             r, bore, t = (1e3 * s for s in self.size)
             size = f"radius {r:.4g}, " + (f"bore radius {bore:.4g}, " if bore else "") + f"thickness {t:.4g}"
         place = ", ".join(f"{1e3 * x:.4g}" for x in np.round(self.pose[:3, 3], 9) + 0.0)
-        out = "" if self.overhang <= 0.0 else f", {1e3 * self.overhang:.3g} mm out of its region"
+        out_of = f", {1e3 * self.overhang:.3g} mm out of its region"
+        out = out_of if self.overhang > _SHOWN * self.radius else ""
         own = float(np.abs(self.parameters[4:]).max())
         off = "" if self.deviation[2] <= _SAME * own else f", inertia off by {self.deviation[2]:.2g} kg m2"
         arm = "" if self.arm is None else f", on an arm of {1e3 * self.arm_size[0]:.4g} mm, {self.arm.mass:.4g} kg"
@@ -158,7 +161,7 @@ class Realisation(Immutable):
             for k, x in self.promised.items()
         )
         reach = self.design.original.length
-        return same and self.residual <= _EXACT and all(w.overhang <= _SAME * reach for w in self.weights)
+        return same and self.residual <= _EXACT and all(w.overhang <= _FITS * reach for w in self.weights)
 
     @property
     def claim(self) -> str:
@@ -215,7 +218,7 @@ def realise(
             in space a ball, unless given.
         material: one of `MATERIALS`, or a density [kg/m3]; steel unless given.
         thickness: along the normal of the plane [m]; a fifth of the chain's characteristic length unless given.
-        arm: width of the arms [m]; a fifth of the outer radius of the counterweight unless given, 0 for none.
+        arm: side of the square arms [m]; a fifth of the outer radius of the counterweight unless given, 0 for none.
 
     Raises:
         UnknownNameError: a shape or material that is not known.
@@ -226,12 +229,13 @@ def realise(
     _ = design.chain  # raises when infeasible
     if design.mode != "add":
         raise InvalidInputError("design", design.mode, "must be of mode 'add' to be made by counterweights")
-    own = all(c.body in design.pieces for c in design.added)
-    if (shape, material, thickness, arm) != (None, None, None, None) or not own:
+    asked = (shape, material, thickness, arm) != (None, None, None, None)
+    if asked or not all(c.body in design.pieces for c in design.added):
         word = shape or ("disc" if design.space.planar else "ball")
         piece = piece_of(design.original, word, material, thickness, arm)
-        if not own or not all(_alike(piece, other) for other in design.pieces.values()):
-            design = _solved_in(design, piece)
+        wanted = {c.body: piece if asked else design.pieces.get(c.body, piece) for c in design.added}
+        if not all(body in design.pieces and _alike(piece, design.pieces[body]) for body, piece in wanted.items()):
+            design = _solved_in(design, wanted)
             _ = design.chain
     made = [_make(design, c) for c in design.added if c.mass > 0.0]
     return Realisation(design, tuple(made))
@@ -262,11 +266,11 @@ def _alike(asked: Piece, made: Piece) -> bool:
     return thin and (asked.arm is None or asked.arm == made.arm)
 
 
-def _solved_in(design: Design, piece: Piece) -> Design:
+def _solved_in(design: Design, pieces: Mapping[str, Piece]) -> Design:
     asked = design.asked
     if asked is None:
         raise InvalidInputError("design", design.status, "must come from balance, to be solved again in pieces")
-    problem = assembled(replace(asked.given, counterweight=piece))
+    problem = assembled(replace(asked.given, counterweight=dict(pieces)))
     return replace(
         problem.solve(asked.minimise, limits=asked.limits),
         alternatives=design.alternatives,
@@ -335,8 +339,7 @@ def _deviation(space: Space, b: int, difference: Array) -> Array:
 def _arm_size(piece: Piece, arm: Change, radius: float) -> tuple[float, ...]:
     """Return length, width and thickness of an arm [m]."""
     width = arm_width(piece, radius)
-    thickness = width if isinstance(piece, Sphere) else piece.thickness
-    return (arm.mass / (density_of(piece.density) * width * thickness), width, thickness)
+    return (arm.mass / (density_of(piece.density) * width**2), width, width)
 
 
 def _overhang(design: Design, b: int, place: Array, radius: float) -> float:

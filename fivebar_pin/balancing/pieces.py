@@ -36,8 +36,9 @@ MATERIALS: Mapping[str, float] = {
     "tungsten": 19250.0,
 }  # densities [kg/m3]
 _IN_PLANE = 1e-9  # share of a line that must lie in the plane of motion [-]
+_RANGE = 1e12  # a bound on density is of use within this range of the mechanism's own inertia [-]
 THICKNESS = 0.2  # of flat material unless given [chain lengths]
-ARM = 0.2  # width of the arms that carry counterweights unless given [outer radii]
+ARM = 0.2  # side of the arms that carry counterweights unless given [outer radii]
 
 
 def density_of(material: str | float) -> float:
@@ -67,8 +68,8 @@ class Disc(Immutable):
         density: [kg/m3], or one of `MATERIALS`.
         thickness: along the normal of the plane [m].
         line: direction in joint axes (3,) along which the centres must lie, through the joint; anywhere unless given.
-        arm: width [m] of the flat arm of the same material and thickness that carries the disc, from the joint to its
-            rim; a fifth of its outer radius unless given, 0 for none (the body itself carries it).
+        arm: side [m] of the square arm of the same material that carries the disc, from the joint to its rim; a fifth
+            of its outer radius unless given, 0 for none (the body itself carries it).
     """
 
     density: float | str
@@ -82,6 +83,7 @@ class Disc(Immutable):
     def solid(self, axes: Array, mass: float, length: float) -> Solid:
         """Return the bounds for scaled parameters of one body (axes (3, 3): rows e_1, e_2, n)."""
         least = mass / (2.0 * np.pi * density_of(self.density) * self.thickness * length**2)
+        least = _usable(least, self.density, self.thickness)
         return Solid("a disc", least, 1.0, least, _across(self.line, axes))
 
 
@@ -104,6 +106,7 @@ class Bar(Immutable):
     def solid(self, axes: Array, mass: float, length: float) -> Solid:
         """Return the bounds for scaled parameters of one body (axes (3, 3): rows e_1, e_2, n)."""
         least = mass / (6.0 * density_of(self.density) * self.thickness * length**2)
+        least = _usable(least, self.density, self.thickness)
         return Solid("a bar", least, 3.0, 0.0, _across(self.line, axes))
 
 
@@ -113,7 +116,7 @@ class Sphere(Immutable):
 
     Attributes:
         density: [kg/m3], or one of `MATERIALS`.
-        arm: width [m] of the square arm of the same material that carries the ball, as for `Disc`.
+        arm: as for `Disc`.
     """
 
     density: float | str
@@ -126,7 +129,7 @@ class Sphere(Immutable):
     def solid(self, axes: Array, mass: float, length: float) -> Solid:
         """Return the bounds for scaled parameters of one body (axes play no part)."""
         radius = float(np.cbrt(3.0 * mass / (4.0 * np.pi * density_of(self.density)))) / length
-        return Solid("a ball", 0.2 * radius**2, 1.0, radius)
+        return Solid("a ball", _usable(0.2 * radius**2, self.density), 1.0, radius)
 
 
 Piece = Disc | Bar | Sphere
@@ -167,8 +170,19 @@ class Density(Immutable):
 def density_bound(density: float, thickness: float, *, planar: bool, mass: float, length: float) -> Density:
     """Return the bound for material of a density [kg/m3], in the plane of a thickness [m], scaled."""
     if planar:
-        return Density(mass / (2.0 * np.pi * density * thickness * length**2))
-    return Density(0.2 * (3.0 * mass / (4.0 * np.pi * density)) ** (2.0 / 3.0) / length**2)
+        least = mass / (2.0 * np.pi * density * thickness * length**2)
+        return Density(_usable(least, density, thickness))
+    return Density(_usable(0.2 * (3.0 * mass / (4.0 * np.pi * density)) ** (2.0 / 3.0) / length**2, density))
+
+
+def _usable(least: float, density: str | float, thickness: float | None = None) -> float:
+    """Return the factor of a bound on density, refused where nothing can be computed with it."""
+    if not 1.0 / _RANGE <= least <= _RANGE:
+        name = "density" if thickness is None else "density and thickness"
+        value = density if thickness is None else (density, thickness)
+        rule = f"give inertias {least:.3g} x those of the mechanism, beyond 1 / {_RANGE:g} to {_RANGE:g}"
+        raise InvalidInputError(name, value, rule, "Use kg/m3 and m, or material=None for any density.")
+    return least
 
 
 def _across(line: npt.ArrayLike | None, axes: Array) -> Array | None:
@@ -194,4 +208,4 @@ def _check_flat(piece: Disc | Bar) -> None:
 
 def _check_arm(width: float | None) -> None:
     if width is not None and width != 0.0:
-        positive("width of the arm", width, "m")
+        positive("side of the arm", width, "m")

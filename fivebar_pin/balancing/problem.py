@@ -46,7 +46,7 @@ _GIVE = ((1e-9, 1e-8), (1e-8, 1e-7))  # margin, and how far regions give way whe
 _ROUGH = 1e-3  # residual of a rough answer, and gap that it may leave to the design without material [-]
 _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of material
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
-_FELT = 1e-12  # factor of an inertia that counts as zero in the conditions and terms of a scaled problem [-]
+_FELT = 1e-9  # factor of an inertia that counts as zero in the conditions and terms of a scaled problem [-]
 _PHYSICAL = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
 
 
@@ -176,7 +176,7 @@ class BalanceProblem(Immutable):
             return assembled(without(left), sizes, arms, elastic=True)._optimum({OVERREACH: 1.0}, further)
 
         rooms = {m.body: m.room * self.space.length for m in self.materials if m.sign > 0}
-        design = Maker(self.chain, self.space, self.pieces, rooms, solved, fitted).search()
+        design = Maker(self.chain, self.space, self.pieces, rooms, solved, fitted, self._objective(weights)[2]).search()
         named = {self.chain.joints[b]: piece for b, piece in self.pieces.items()}
         return replace(design, asked=asked, pieces=named)
 
@@ -302,6 +302,7 @@ class BalanceProblem(Immutable):
         x = self._compact(outcome.x[: self.n], asked.weights, asked.limits)
         for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
             y, residual = self._exact(x, drop)
+            y = self._compact(y, asked.weights, asked.limits)  # again: inertias about centres that have moved a hair
             parts = _lift.lift(self, y)
             if residual <= _EXACT and parts.lowest >= -_PHYSICAL:
                 break

@@ -42,7 +42,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--realise", choices=("disc", "bar", "ball"), help="solve for counterweights of this shape, and make them"
     )
     balance.add_argument(
-        "--arm", type=float, help="width of the arms that carry them [m]; 0: none [a fifth of a radius]"
+        "--arm", type=float, help="side of the square arms that carry them [m]; 0: none [a fifth of a radius]"
     )
     balance.add_argument("--out", metavar="FOLDER", help="write the design, the curves and a page before / after there")
     balance.add_argument("--overwrite", action="store_true", help="replace files that exist already")
