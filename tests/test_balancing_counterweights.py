@@ -361,3 +361,27 @@ def test_where_conditions_leave_no_material_the_empty_mechanism_is_the_design() 
     design = balance_problem(case.chain, case.kind, **case.arguments).solve(case.minimise)
     assert design.feasible and not design.parameters.any()
     assert 0.0 <= design.gap <= 1e-3 * design.objective
+
+
+@pytest.mark.parametrize("kind", [Disc, Bar])
+@pytest.mark.parametrize("name", ["six_bar_watt", "six_bar_stephenson", "planar_3rrr", "slider_crank"])
+def test_long_arms_with_light_weights_come_to_rest(name: str, kind: type[Disc] | type[Bar]) -> None:
+    """Far out, an arm weighs as much as what it carries: pieces and arms must find each other."""
+    chain = fb.load(name)
+    piece = kind("steel", 0.2 * chain.length)
+    design = balance(chain, "force", region=Ball(3.0 * chain.length), counterweight=piece)
+    made = realise(design)
+    assert design.status == "optimal" and made.attained and design.arms
+    for w in made.weights:
+        if w.arm is not None:
+            gap = np.linalg.norm(w.pose[:3, 3]) - w.radius - w.arm_size[0]
+            assert abs(gap) < 1e-3 * chain.length
+    assert np.abs(design.conditions.residual(made.chain)).max() < 1e-12
+
+
+@pytest.mark.parametrize("piece", [Disc("steel", 1e308), Bar(1e-300, 0.01), Sphere(1e300)])
+def test_densities_beyond_use_are_refused(piece: object) -> None:
+    with pytest.raises(InvalidInputError, match=r"density.*beyond"):
+        balance(case_I()[0], "force", counterweight=piece)
+    with pytest.raises(InvalidInputError, match=r"density and thickness.*beyond"):
+        balance(case_I()[0], "force", thickness=1e308)
