@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import balance_problems
 import mechanisms
 import numpy as np
@@ -385,3 +387,38 @@ def test_densities_beyond_use_are_refused(piece: object) -> None:
         balance(case_I()[0], "force", counterweight=piece)
     with pytest.raises(InvalidInputError, match=r"density and thickness.*beyond"):
         balance(case_I()[0], "force", thickness=1e308)
+
+
+def test_what_differs_from_the_promise_is_not_called_attained() -> None:
+    chain, _ = crank_rocker()
+    made = realise(balance(chain, "force", region=Ball(0.2), counterweight=BARE))
+    assert made.attained
+    heavier = replace(made.weights[0], parameters=made.weights[0].parameters * 1.01)
+    moved = replace(made, weights=(heavier, *made.weights[1:]))
+    assert not moved.attained and moved.residual > 1e-6 and "take the realised figures" in moved.claim
+    out = replace(made.weights[0], overhang=1e-3)
+    assert not replace(made, weights=(out, *made.weights[1:])).attained
+
+
+def test_a_gap_that_proves_nothing_is_not_called_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
+    from fivebar_pin.balancing import problem
+
+    chain, _ = crank_rocker()
+    assert balance(chain, "force", region=Ball(0.2)).status == "optimal"
+    monkeypatch.setattr(problem, "PROVED", -1.0)
+    assert balance(chain, "force", region=Ball(0.2)).status == "feasible"
+
+
+def test_pieces_that_wander_are_held_until_they_rest() -> None:
+    from fivebar_pin.cli._moving import moved
+
+    chain = fb.load("planar_3rrr")
+    design = balance(
+        chain,
+        None,
+        minimise={"rms_shaking_moment": 1.0, "added_mass": 0.1},
+        region=Ball(3.0 * chain.length),
+        counterweight=Bar("brass", 0.2 * chain.length),
+        motions=moved(chain, None),
+    )
+    assert realise(design).attained
