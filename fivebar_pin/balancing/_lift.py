@@ -70,7 +70,7 @@ def linear(chain: ClosedChain, space: Space, mass: float, materials: Sequence[Ma
     """
     E = np.zeros((10 * len(chain.joints), sum(m.size for m in materials)))
     for m in materials:
-        for k, unit in enumerate(np.eye(m.size)):
+        for k, unit in enumerate(np.eye(m.size)[:10]):  # moments; what cones need besides comes after them
             E[10 * m.body : 10 * m.body + 10, m.start + k] = m.sign * _ten(chain, space, mass, m, unit)
     return E
 

@@ -15,9 +15,9 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, frozen
-from fivebar_pin.balancing._parameters import Space
+from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing.design import PROVED, Change, Design, change_of
-from fivebar_pin.balancing.pieces import ARM, Piece, Sphere, density_of
+from fivebar_pin.balancing.pieces import ARM, Piece, Sphere, ball_radius, density_of
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
 
@@ -255,7 +255,7 @@ def outer_radius(piece: Piece, change: Change, axes: Array) -> float:
     if m <= 0.0:
         return 0.0
     if isinstance(piece, Sphere):
-        return float(np.cbrt(0.75 * m / (np.pi * density_of(piece.density))))
+        return ball_radius(density_of(piece.density), m)
     solid = piece.solid(axes, 1.0, 1.0)
     inertia = max(float(axes[2] @ change.inertia @ axes[2]), solid.least * m * m)
     return float(np.sqrt(solid.alpha * inertia / m + solid.beta * m))
@@ -277,15 +277,9 @@ def arm_of(piece: Piece, change: Change, axes: Array, planar: bool) -> Change | 
         return None
     mass = density_of(piece.density) * width**2 * reach
     x = flat / distance
-    z = axes[2] if planar else across(x)
+    z = axes[2] if planar else plane_axes(x)[0]
     turn = np.column_stack([x, np.cross(z, x), z])
     squares = np.array([reach, width, width]) ** 2
     own = turn @ np.diag(mass / 12.0 * (squares.sum() - squares)) @ turn.T
     place = 0.5 * reach * x + (change.place - flat)
     return change_of(change.body, np.array(pin.Inertia(mass, place, own).toDynamicParameters()))
-
-
-def across(x: Array) -> Array:
-    """Return a unit vector at right angles to x (3,)."""
-    z = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
-    return np.asarray(z / np.linalg.norm(z))

@@ -20,12 +20,12 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, figures, frozen
-from fivebar_pin.balancing._making import across, arm_width
-from fivebar_pin.balancing._parameters import Space
+from fivebar_pin.balancing._making import arm_width
+from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._quantities import reflected_inertia
 from fivebar_pin.balancing._terms import base, measure_of
 from fivebar_pin.balancing.design import Change, Design
-from fivebar_pin.balancing.pieces import THICKNESS, Bar, Disc, Piece, Sphere, density_of, positive
+from fivebar_pin.balancing.pieces import Bar, Disc, Piece, Sphere, ball_radius, density_of, thickness_of
 from fivebar_pin.balancing.problem import assembled
 from fivebar_pin.balancing.regions import Ball, resolve
 from fivebar_pin.chain import ClosedChain, Visual
@@ -169,7 +169,7 @@ class Realisation(Immutable):
         d = self.design
         if not self.attained:
             return "the pieces do not have what the design asks for: take the realised figures"
-        kind = "of this kind and with these arms" if d.arms else "of this kind"
+        kind = "of this kind, on these bodies and with these arms," if d.arms else "of this kind"
         if d.status == "optimal":
             return f"optimal: no counterweights {kind} are better than {d.dual_bound:.9g}"
         best = f"none {kind} is better than {d.dual_bound:.9g}"
@@ -254,7 +254,7 @@ def piece_of(
     stuff = "steel" if material is None else material
     if shape == "ball":
         return Sphere(density_of(stuff), arm)
-    thick = THICKNESS * chain.length if thickness is None else positive("thickness", thickness, "m")
+    thick = thickness_of(thickness, chain.length)
     return (Disc if shape == "disc" else Bar)(density_of(stuff), thick, arm=arm)
 
 
@@ -301,7 +301,7 @@ def _make(design: Design, change: Change) -> Counterweight:
     pose = np.eye(4)
     pose[:3, 3] = change.place
     if isinstance(piece, Sphere):
-        r = radius = float(np.cbrt(0.75 * m / (np.pi * density)))
+        r = radius = ball_radius(density, m)
         size: tuple[float, ...] = (r,)
         inertia = np.eye(3) * 0.4 * m * r * r
     else:
@@ -417,7 +417,7 @@ def _visuals(chain: ClosedChain, w: Counterweight) -> list[Visual]:
     if w.arm is not None:
         x = w.arm.place - w.pose[:3, 2] * float(w.pose[:3, 2] @ w.arm.place) if w.shape != "ball" else w.arm.place
         x = x / np.linalg.norm(x)
-        z = w.pose[:3, 2] if w.shape != "ball" else across(x)
+        z = w.pose[:3, 2] if w.shape != "ball" else plane_axes(x)[0]
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = np.column_stack([x, np.cross(z, x), z]), w.arm.place
         out.append(Visual(frame.name, "box", w.arm_size, into @ pose, COLOUR))

@@ -69,6 +69,7 @@ class Design(Immutable):
         objective: weighted sum of the terms.
         dual_bound: no design within the bounds has a lower objective, whatever the solver's errors (see
             `solvers.bound`): they are charged against the bounds on the variables that follow from masses and regions.
+            Of counterweights on arms: none on the same bodies with the same arms is better.
         terms: value of every term of the objective, in its own unit.
         parameters: inertial parameters of all bodies (nb, 10); nan when infeasible.
         added, removed: material per body that may change; for a redesign, `added` holds the new bodies.

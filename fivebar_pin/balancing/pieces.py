@@ -36,6 +36,7 @@ MATERIALS: Mapping[str, float] = {
     "tungsten": 19250.0,
 }  # densities [kg/m3]
 _IN_PLANE = 1e-9  # share of a line that must lie in the plane of motion [-]
+_DISC, _BAR = 2.0 * np.pi, 6.0  # m^2 / (d t I_c) of a solid disc and of a square bar [-]
 _RANGE = 1e12  # a bound on density is of use within this range of the mechanism's own inertia [-]
 THICKNESS = 0.2  # of flat material unless given [chain lengths]
 ARM = 0.2  # side of the arms that carry counterweights unless given [outer radii]
@@ -52,16 +53,36 @@ def density_of(material: str | float) -> float:
         if material not in MATERIALS:
             raise UnknownNameError("material", material, MATERIALS)
         return MATERIALS[material]
-    return positive("density", material, "kg/m3")
+    return number("density", material, positive=True, unit="kg/m3")
 
 
-def positive(name: str, value: float, unit: str) -> float:
-    """Return a positive, finite number, checked."""
-    return number(name, value, positive=True, unit=unit)
+def thickness_of(thickness: float | None, length: float) -> float:
+    """Return the thickness [m] of flat material given, checked, or that of a chain of a characteristic length."""
+    return THICKNESS * length if thickness is None else number("thickness", thickness, positive=True, unit="m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Disc(Immutable):
+class _Flat(Immutable):
+    """What flat pieces have in common; see `Disc`."""
+
+    density: float | str
+    thickness: float
+    line: npt.ArrayLike | None = None
+    arm: float | None = None
+
+    def __post_init__(self) -> None:
+        density_of(self.density)
+        number("thickness of the counterweight", self.thickness, positive=True, unit="m")
+        _check_arm(self.arm)
+        if self.line is not None:
+            line = checked("line of the counterweight", self.line, (3,))
+            if not line.any():
+                raise InvalidInputError("line of the counterweight", line.tolist(), "must not be zero")
+            object.__setattr__(self, "line", line)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disc(_Flat):
     """Counterweights made as flat discs, solid or with a bore, of one material and thickness.
 
     Attributes:
@@ -72,41 +93,23 @@ class Disc(Immutable):
             of its outer radius unless given, 0 for none (the body itself carries it).
     """
 
-    density: float | str
-    thickness: float
-    line: npt.ArrayLike | None = None
-    arm: float | None = None
-
-    def __post_init__(self) -> None:
-        _check_flat(self)
-
     def solid(self, axes: Array, mass: float, length: float) -> Solid:
         """Return the bounds for scaled parameters of one body (axes (3, 3): rows e_1, e_2, n)."""
-        least = mass / (2.0 * np.pi * density_of(self.density) * self.thickness * length**2)
-        least = _usable(least, self.density, self.thickness)
+        least = _least_flat(_DISC, self.density, self.thickness, mass, length)
         return Solid("a disc", least, 1.0, least, _across(self.line, axes))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bar(Immutable):
+class Bar(_Flat):
     """Counterweights made as flat rectangles, along the line from the joint to their centre.
 
     Attributes:
         density, thickness, line, arm: as for `Disc`.
     """
 
-    density: float | str
-    thickness: float
-    line: npt.ArrayLike | None = None
-    arm: float | None = None
-
-    def __post_init__(self) -> None:
-        _check_flat(self)
-
     def solid(self, axes: Array, mass: float, length: float) -> Solid:
         """Return the bounds for scaled parameters of one body (axes (3, 3): rows e_1, e_2, n)."""
-        least = mass / (6.0 * density_of(self.density) * self.thickness * length**2)
-        least = _usable(least, self.density, self.thickness)
+        least = _least_flat(_BAR, self.density, self.thickness, mass, length)
         return Solid("a bar", least, 3.0, 0.0, _across(self.line, axes))
 
 
@@ -128,7 +131,7 @@ class Sphere(Immutable):
 
     def solid(self, axes: Array, mass: float, length: float) -> Solid:
         """Return the bounds for scaled parameters of one body (axes play no part)."""
-        radius = float(np.cbrt(3.0 * mass / (4.0 * np.pi * density_of(self.density)))) / length
+        radius = ball_radius(density_of(self.density), mass) / length
         return Solid("a ball", _usable(0.2 * radius**2, self.density), 1.0, radius)
 
 
@@ -170,9 +173,18 @@ class Density(Immutable):
 def density_bound(density: float, thickness: float, *, planar: bool, mass: float, length: float) -> Density:
     """Return the bound for material of a density [kg/m3], in the plane of a thickness [m], scaled."""
     if planar:
-        least = mass / (2.0 * np.pi * density * thickness * length**2)
-        return Density(_usable(least, density, thickness))
-    return Density(_usable(0.2 * (3.0 * mass / (4.0 * np.pi * density)) ** (2.0 / 3.0) / length**2, density))
+        return Density(_least_flat(_DISC, density, thickness, mass, length))
+    return Density(_usable(0.2 * (ball_radius(density, mass) / length) ** 2, density))
+
+
+def ball_radius(density: float, mass: float) -> float:
+    """Return the radius [m] of a ball of a density [kg/m3] and a mass [kg]."""
+    return float(np.cbrt(3.0 * mass / (4.0 * np.pi * density)))
+
+
+def _least_flat(shape: float, density: float | str, thickness: float, mass: float, length: float) -> float:
+    """Return the least I_c / m^2 of a flat piece, 1 / (shape d t), scaled."""
+    return _usable(mass / (shape * density_of(density) * thickness * length**2), density, thickness)
 
 
 def _usable(least: float, density: str | float, thickness: float | None = None) -> float:
@@ -195,17 +207,6 @@ def _across(line: npt.ArrayLike | None, axes: Array) -> Array | None:
     return frozen([-flat[1] / size, flat[0] / size])
 
 
-def _check_flat(piece: Disc | Bar) -> None:
-    density_of(piece.density)
-    positive("thickness of the counterweight", piece.thickness, "m")
-    _check_arm(piece.arm)
-    if piece.line is not None:
-        line = checked("line of the counterweight", piece.line, (3,))
-        if not line.any():
-            raise InvalidInputError("line of the counterweight", line.tolist(), "must not be zero")
-        object.__setattr__(piece, "line", line)
-
-
 def _check_arm(width: float | None) -> None:
     if width is not None and width != 0.0:
-        positive("side of the arm", width, "m")
+        number("side of the arm", width, positive=True, unit="m")

@@ -32,7 +32,7 @@ from fivebar_pin.balancing._setup import MassBounds, Setup
 from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, positive_limit
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, conditions_for
 from fivebar_pin.balancing.design import PROVED, Asked, Design
-from fivebar_pin.balancing.pieces import THICKNESS, Piece, density_of, positive
+from fivebar_pin.balancing.pieces import Piece, density_of, thickness_of
 from fivebar_pin.balancing.regions import Region
 from fivebar_pin.balancing.solvers import DEFAULT, SECOND, Block, Certificate, Outcome, Program, solve, solver_named
 from fivebar_pin.balancing.solvers.cones import outside
@@ -299,10 +299,11 @@ class BalanceProblem(Immutable):
     def _finish(self, outcome: Outcome, asked: _Task) -> tuple[Design | None, str]:
         """Make a solution exact and check it; None and the reason when it is not physical."""
         assert outcome.x is not None
-        x = self._compact(outcome.x[: self.n], asked.weights, asked.limits)
+        felt = self._felt(asked)
+        x = self._compact(outcome.x[: self.n], felt)
         for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
             y, residual = self._exact(x, drop)
-            y = self._compact(y, asked.weights, asked.limits)  # again: inertias about centres that have moved a hair
+            y = self._compact(y, felt)  # again: inertias about centres that have moved a hair
             parts = _lift.lift(self, y)
             if residual <= _EXACT and parts.lowest >= -_PHYSICAL:
                 break
@@ -333,13 +334,16 @@ class BalanceProblem(Immutable):
         )
         return design, ""
 
-    def _compact(self, y: Array, weights: Mapping[str, float], limits: Sequence[Block]) -> Array:
-        """Return the variables with the least inertia that a piece can have, where nothing depends on it."""
-        rows = [b.G for b in (*self.limited, *limits)]
-        rows += [G for name in weights for G, _ in self.terms[base(name)].vectors]
+    def _felt(self, asked: _Task) -> npt.NDArray[np.bool_]:
+        """Return which variables (n,) the conditions, the objective and the limits depend on."""
+        rows = [b.G for b in (*self.limited, *asked.limits)]
+        rows += [G for name in asked.weights for G, _ in self.terms[base(name)].vectors]
         if self.conditions is not None:
             rows.append(self.conditions.rows @ self.E)
-        felt = np.max([np.abs(G).max(axis=0, initial=0.0) for G in rows], axis=0) > _FELT
+        return np.asarray(np.max([np.abs(G).max(axis=0, initial=0.0) for G in rows], axis=0) > _FELT)
+
+    def _compact(self, y: Array, felt: npt.NDArray[np.bool_]) -> Array:
+        """Return the variables with the least inertia that a piece can have, where nothing depends on it."""
         y = np.array(y)
         for m in self.materials:
             own = slice(m.start, m.start + m.size)
@@ -466,7 +470,7 @@ def balance_problem(
 
 def stuff(chain: ClosedChain, material: str | float | None, thickness: float | None) -> tuple[float, float] | None:
     """Return density [kg/m3] and thickness [m] of the material, or None for any density."""
-    thick = THICKNESS * chain.length if thickness is None else positive("thickness", thickness, "m")
+    thick = thickness_of(thickness, chain.length)
     return None if material is None else (density_of(material), thick)
 
 
