@@ -37,7 +37,7 @@ def main():
     easiest = fb.balance(chain, "force", minimise="rms_torque", **options)
     designs = {
         "unbalanced": chain,
-        "paper's optimum": paper.balance(paper.table_1("I", "balanced")).linkage.chain(),
+        "paper's optimum": paper.balance_mass_centres(paper.table_1("I", "balanced")).linkage.chain(),
         "least added mass, lead discs": balancing.realise(lightest, material="lead").chain,
         "least RMS torque": easiest.chain,
     }

@@ -15,7 +15,7 @@ from rich.progress import Progress
 
 import fivebar_pin as fb
 from fivebar_pin import viz
-from fivebar_pin.simulation import energy_balance
+from fivebar_pin.dynamics import energy_balance
 
 ROD = pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), np.diag([0.0, 1.0 / 12.0, 1.0 / 12.0]))  # 1 kg, 1 m
 FAR = np.full(1, 1e4)  # joint limits [rad]

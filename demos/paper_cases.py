@@ -39,7 +39,7 @@ def main():
     everything = []
     for case, reading in (("I", "printed"), ("II", "printed"), ("II", "corrected")):
         printed = paper.table_1(case, "balanced", reading=reading)
-        optimum = paper.balance(printed)
+        optimum = paper.balance_mass_centres(printed)
         rho, residual = np.round(optimum.linkage.rho, 6), optimum.kkt_residual
         print(f"case {case}, masses {reading}: rho = {rho}, optimality residual {residual:.1e}")
         for label, linkage in (

@@ -24,12 +24,13 @@ if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure, ClosureKind
     from fivebar_pin.diagnosis import Diagnosis, diagnose
-    from fivebar_pin.dynamics import Loads, inverse_dynamics
+    from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics
     from fivebar_pin.errors import FiveBarPinError
     from fivebar_pin.io import load, save
     from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
     from fivebar_pin.motion import Motion
-    from fivebar_pin.simulation import JointSpring, Spring, energy_balance, forward_dynamics, simulate
+    from fivebar_pin.simulation import simulate
+    from fivebar_pin.springs import JointSpring, Spring
     from fivebar_pin.trajectory import Trajectory
 
 __all__ = [
@@ -74,13 +75,14 @@ _LATE = {
     "chain": ("ClosedChain", "Visual"),
     "closures": ("Closure", "ClosureKind"),
     "diagnosis": ("Diagnosis", "diagnose"),
-    "dynamics": ("Loads", "inverse_dynamics"),
+    "dynamics": ("Loads", "energy_balance", "forward_dynamics", "inverse_dynamics"),
     "errors": ("FiveBarPinError",),
     "io": ("load", "save"),
     "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive"),
     "motion": ("Motion",),
     "paper": (),
-    "simulation": ("JointSpring", "Spring", "energy_balance", "forward_dynamics", "simulate"),
+    "simulation": ("simulate",),
+    "springs": ("JointSpring", "Spring"),
     "trajectory": ("Trajectory",),
     "viz": (),
 }

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
 import fivebar_pin as fb
-from fivebar_pin import _arrays, paper
+from fivebar_pin import paper
 from fivebar_pin._arrays import integer, numeric, require_memory
 from fivebar_pin.balancing import variations
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, OutputError, UnknownNameError
@@ -109,7 +111,7 @@ def test_more_than_the_memory_of_the_machine_is_refused(chain: fb.ClosedChain, m
     """It would be given by the system, and end other programs when it is used."""
     with pytest.raises(InvalidInputError, match=r"count = 100000000000 but needs .* GB of memory.*Ask for less"):
         variations(chain, 10**11)
-    monkeypatch.setattr(_arrays.os, "sysconf", lambda _: 10)  # a machine of 100 bytes
+    monkeypatch.setattr(os, "sysconf", lambda _: 10)  # a machine of 100 bytes
     require_memory("count", 1, 100.0)
     with pytest.raises(InvalidInputError, match="Ask for less"):
         require_memory("count", 1, 101.0)

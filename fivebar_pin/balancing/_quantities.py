@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import ROUND_OFF, Array, Immutable
-from fivebar_pin._reactions import determinate
 from fivebar_pin.balancing._reaction_rows import reactions
 from fivebar_pin.balancing.regressors import regressor
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics import inverse_dynamics
+from fivebar_pin.dynamics.reactions import determinate
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.kinematics import drive
 from fivebar_pin.motion import Motion

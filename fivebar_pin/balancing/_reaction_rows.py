@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fivebar_pin import closures as closure_rows
 from fivebar_pin._arrays import Array, skew
-from fivebar_pin._loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin.balancing._state import gravity_of, state_of, torque_offset, tree_torque
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.closures import closure as closure_rows
+from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin.trajectory import Trajectory
 
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, cross, skew
-from fivebar_pin._bodies import accelerations
-from fivebar_pin._loops import Loops, loops_of
-from fivebar_pin._tree import Poses
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics import friction_torque
+from fivebar_pin.dynamics.bodies import accelerations
+from fivebar_pin.dynamics.losses import friction_torque
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.trajectory import Trajectory
 
 

@@ -21,13 +21,13 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integer, skew
-from fivebar_pin._loops import loops_of
 from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
 from fivebar_pin.balancing._state import State
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
+from fivebar_pin.mechanism.loops import loops_of
 
 __all__ = ["KINDS", "BalanceConditions", "balance_conditions"]
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from fivebar_pin import motion as laws
 from fivebar_pin._arrays import Array
-from fivebar_pin._loops import loops_of
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
 from fivebar_pin.kinematics import assemble, drive
+from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.trajectory import Trajectory
 
 

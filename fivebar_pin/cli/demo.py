@@ -86,7 +86,7 @@ def run(chosen: argparse.Namespace) -> int:
         else paper.default_motion(samples=chosen.samples, period=chosen.period)
     )
     unbalanced = paper.table_1(chosen.case, "unbalanced")
-    optimum = paper.balance(paper.table_1(chosen.case, "balanced", reading=chosen.reading))
+    optimum = paper.balance_mass_centres(paper.table_1(chosen.case, "balanced", reading=chosen.reading))
     runs = [
         _moved(label, linkage, motion, mode, chosen.gravity or (0.0, 0.0, 0.0))
         for label, linkage in (("unbalanced", unbalanced), ("balanced", optimum.linkage))

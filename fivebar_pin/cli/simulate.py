@@ -12,8 +12,9 @@ from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._load import add_gravity, load_any
+from fivebar_pin.dynamics import energy_balance
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.simulation import energy_balance, simulate
+from fivebar_pin.simulation import simulate
 
 _LONGEST = 1e9  # time to simulate [s]; a progress bar cannot even show more
 

@@ -11,8 +11,8 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.io._entries import UNLIMITED, JointEntry, TreeEntry
 from fivebar_pin.io._sidecar import DATA_FIELDS, UNIVERSAL, Sidecar
-from fivebar_pin.io._tree import UNLIMITED, JointEntry, TreeEntry
 
 __all__ = ["bare_inertia", "build_model", "joint_model", "joint_order", "set_default_limits"]
 

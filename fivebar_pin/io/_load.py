@@ -14,9 +14,9 @@ from fivebar_pin.chain import ClosedChain, Visual, frames_by_name
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
+from fivebar_pin.io._entries import TreeEntry
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
-from fivebar_pin.io._tree import TreeEntry
 from fivebar_pin.io._urdf import read_urdf
 
 __all__ = ["load"]

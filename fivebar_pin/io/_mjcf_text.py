@@ -18,9 +18,9 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.io._entries import JointEntry, TreeEntry
 from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
 from fivebar_pin.io._outline import outline
-from fivebar_pin.io._tree import JointEntry, TreeEntry
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
 
 __all__ = ["mjcf_text"]

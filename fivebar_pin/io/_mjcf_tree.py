@@ -10,9 +10,9 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
 from fivebar_pin.errors import UnknownNameError
+from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry
 from fivebar_pin.io._mjcf_mass import geom_inertia, geom_shape, stated_inertia
 from fivebar_pin.io._mjcf_reader import MjcfReader
-from fivebar_pin.io._tree import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry
 
 __all__ = ["WORLD", "BodyTree"]
 

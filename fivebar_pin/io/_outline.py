@@ -12,8 +12,8 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._build import joint_model, set_default_limits
+from fivebar_pin.io._entries import JointEntry, LinkEntry, TreeEntry
 from fivebar_pin.io._sidecar import DATA_FIELDS
-from fivebar_pin.io._tree import JointEntry, LinkEntry, TreeEntry
 
 __all__ = ["joint_data", "outline"]
 

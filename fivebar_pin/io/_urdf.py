@@ -13,7 +13,7 @@ from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import Visual
 from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import bare_inertia
-from fivebar_pin.io._tree import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
+from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
 from fivebar_pin.io._xml import Reader, parse_xml
 
 __all__ = ["read_urdf"]

@@ -13,9 +13,9 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._build import joint_order
+from fivebar_pin.io._entries import UNLIMITED, JointEntry, LinkEntry, TreeEntry, matrix_to_rpy
 from fivebar_pin.io._outline import joint_data, outline
 from fivebar_pin.io._sidecar import DATA_WORDS, Sidecar
-from fivebar_pin.io._tree import UNLIMITED, JointEntry, LinkEntry, TreeEntry, matrix_to_rpy
 
 __all__ = ["configurations", "mesh_name", "numbers", "urdf_and_sidecar"]
 

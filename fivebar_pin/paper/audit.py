@@ -10,10 +10,11 @@ import numpy as np
 
 from fivebar_pin._arrays import Immutable
 from fivebar_pin.motion import Motion
+from fivebar_pin.paper.assembly_mode import AssemblyMode
 from fivebar_pin.paper.closed_form import solve
 from fivebar_pin.paper.equations import Conditions, conditions
-from fivebar_pin.paper.linkage import AssemblyMode, FiveBar
-from fivebar_pin.paper.optimum import balance
+from fivebar_pin.paper.linkage import FiveBar
+from fivebar_pin.paper.optimum import balance_mass_centres
 from fivebar_pin.paper.table import default_motion, table_1
 
 __all__ = ["READINGS", "AuditRow", "Loading", "audit_table_1", "loading"]
@@ -82,7 +83,7 @@ def audit_table_1(motion: Motion | None = None, *, mode: AssemblyMode = Assembly
 
 def _audit(case: str, reading: str, motion: Motion, mode: AssemblyMode) -> AuditRow:
     printed = table_1(case, "balanced", reading=reading)
-    optimum = balance(printed).linkage
+    optimum = balance_mass_centres(printed).linkage
     reading_, closest = _closest_reading(printed)
     return AuditRow(
         case=case,

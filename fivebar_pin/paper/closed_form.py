@@ -16,9 +16,10 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, frozen
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.motion import Motion
-from fivebar_pin.paper.kinematics import links, partials, passive_acceleration, unwrapped
-from fivebar_pin.paper.linkage import AssemblyMode, CArray, FiveBar
+from fivebar_pin.paper.assembly_mode import AssemblyMode
+from fivebar_pin.paper.linkage import FiveBar
 from fivebar_pin.paper.path import check_path
+from fivebar_pin.paper.positions import CArray, links, partials, passive_acceleration, unwrapped
 from fivebar_pin.paper.solution import Solution
 
 __all__ = ["solve", "solve_states"]
@@ -102,9 +103,9 @@ def _solve(
         s = slice(k, min(k + _BLOCK, n))
         q, v, a = (x[:, s] for x in driven)
         try:
-            b, X, out.reach2[s] = links(linkage, q[0], q[1], mode=mode)
+            b, X, out.reach2[s] = links(linkage.lengths, q[0], q[1], mode=mode)
         except (AssemblyError, SingularityError):
-            links(linkage, *driven[0], mode=mode, times=times)  # names the worst sample of all
+            links(linkage.lengths, *driven[0], mode=mode, times=times)  # names the worst sample of all
             raise
         _move(b, X, (q, v, a), out, s)
         _load(load, b, X, out, s)

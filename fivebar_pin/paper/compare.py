@@ -16,16 +16,17 @@ from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.motion import Motion
 from fivebar_pin.paper import matrices
+from fivebar_pin.paper.assembly_mode import AssemblyMode
 from fivebar_pin.paper.closed_form import solve
-from fivebar_pin.paper.linkage import AssemblyMode, FiveBar
+from fivebar_pin.paper.linkage import FiveBar
 from fivebar_pin.paper.solution import Solution
 from fivebar_pin.paper.table import default_motion
 
-__all__ = ["Comparison", "compare_complements"]
+__all__ = ["ComplementComparison", "compare_complements"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison(Immutable):
+class ComplementComparison(Immutable):
     """Largest values over the samples at which psi' is not zero.
 
     Attributes:
@@ -80,7 +81,7 @@ class Comparison(Immutable):
 @finite()
 def compare_complements(
     linkage: FiveBar, motion: Motion | None = None, *, mode: AssemblyMode = AssemblyMode.LEFT
-) -> Comparison:
+) -> ComplementComparison:
     """Compare the printed u (41), the repaired u and N along a motion.
 
     Args:
@@ -123,7 +124,7 @@ def _pick(solution: Solution, index: Array | np.ndarray[tuple[int], np.dtype[np.
     return Solution(solution.linkage, solution.mode, motion.t, **rows)
 
 
-def _compare(solution: Solution, skipped: int) -> Comparison:
+def _compare(solution: Solution, skipped: int) -> ComplementComparison:
     U, printed = matrices.u(solution), matrices.u(solution, form="printed")
     A, M = matrices.A(solution), matrices.M(solution.linkage)
     t, v = matrices.twist(solution), solution.rates[:, ::3]
@@ -135,7 +136,7 @@ def _compare(solution: Solution, skipped: int) -> Comparison:
         result[f"twist{name}"] = _largest((u @ v[..., None])[..., 0] - t) / speed
         result[f"inertia{name}"] = _largest(np.swapaxes(u, 1, 2) @ M @ u - inertia) / weight
         result[f"torque{name}"] = _largest(matrices.tau(solution, form=form) - solution.torque) / pull
-    return Comparison(
+    return ComplementComparison(
         mode=solution.mode,
         samples=len(solution),
         skipped=skipped,

@@ -14,7 +14,7 @@ from fivebar_pin.paper import matrices
 from fivebar_pin.paper.closed_form import solve, solve_states
 from fivebar_pin.paper.equations import conditions
 from fivebar_pin.paper.linkage import FiveBar
-from fivebar_pin.paper.optimum import balance
+from fivebar_pin.paper.optimum import balance_mass_centres
 from fivebar_pin.paper.solution import Solution
 from fivebar_pin.paper.table import default_motion, table_1
 from fivebar_pin.paper.velocity_ratios import phi_loop, printed_theta_slopes, ratio_rates, ratios, theta_loop
@@ -176,7 +176,7 @@ def dropped_turn(s: Solution) -> Pair:
 
 def frame_force(_: Solution) -> Pair:
     motion = default_motion(samples=41)
-    f = solve(balance(table_1("I", "balanced")).linkage, motion).joint_forces
+    f = solve(balance_mass_centres(table_1("I", "balanced")).linkage, motion).joint_forces
     scale = np.abs(solve(table_1("I", "unbalanced"), motion).shaking_force).max()
     return float(np.abs(f[:, 0] + f[:, 4]).max() / scale), float(np.abs(f[:, 4] - f[:, 0]).max() / scale)
 
@@ -198,7 +198,7 @@ def crank(_: Solution) -> Pair:
 def balanced(case: str, reading: str) -> Callable[[Solution], Pair]:
     def evidence(_: Solution) -> Pair:
         printed = table_1(case, "balanced", reading=reading)
-        return conditions(printed).worst, balance(printed).conditions.worst
+        return conditions(printed).worst, balance_mass_centres(printed).conditions.worst
 
     return evidence
 
@@ -206,6 +206,6 @@ def balanced(case: str, reading: str) -> Callable[[Solution], Pair]:
 def negligible(_: Solution) -> Pair:
     motion = default_motion(samples=201)
     before = solve(table_1("I", "unbalanced"), motion)
-    after = solve(balance(table_1("I", "balanced")).linkage, motion)
+    after = solve(balance_mass_centres(table_1("I", "balanced")).linkage, motion)
     torque = np.abs(after.torque[:, 0]).max() / np.abs(before.torque[:, 0]).max()
     return float(torque), float(np.abs(after.shaking_force).max() / np.abs(before.shaking_force).max())

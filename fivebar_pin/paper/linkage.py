@@ -8,7 +8,6 @@ vector from O_i to the mass centre C_i is r_i = kappa_i r_{i,i+1}, (54)-(57); li
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 import numpy.typing as npt
@@ -17,40 +16,14 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array, Immutable, checked, frozen, numeric
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure, ClosureKind
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.paper.assembly_mode import AssemblyMode
+from fivebar_pin.paper.positions import CArray, position
 
-__all__ = ["AssemblyMode", "CArray", "FiveBar"]
-
-CArray = npt.NDArray[np.complex128]
+__all__ = ["FiveBar"]
 
 _WIDE = 1e4  # joint limit [rad]: the angles may turn many times
 _COLOURS = ((0.16, 0.44, 0.70), (0.90, 0.62, 0.10), (0.34, 0.62, 0.32), (0.76, 0.30, 0.28))
-
-
-class AssemblyMode(Enum):
-    """Which of the two solutions of the loop closure (6): O3 to the left or right of the ray from O2 to O4."""
-
-    LEFT = "left"
-    RIGHT = "right"
-
-    @property
-    def sign(self) -> float:
-        """+1 for LEFT, -1 for RIGHT."""
-        return 1.0 if self is AssemblyMode.LEFT else -1.0
-
-    @classmethod
-    def parse(cls, value: object) -> AssemblyMode:
-        """Return the mode given as such or by its word.
-
-        Raises:
-            UnknownNameError: neither "left" nor "right".
-        """
-        if isinstance(value, cls):
-            return value
-        try:
-            return cls(str(value).strip().lower())
-        except ValueError:
-            raise UnknownNameError("assembly mode", value, [m.value for m in cls]) from None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,15 +134,13 @@ class FiveBar(Immutable):
             AssemblyError: the loop cannot be closed (which sample, and by how much).
             SingularityError: O2, O3 and O4 lie on a line.
         """
-        from fivebar_pin.paper.kinematics import position
-
         given = numeric("psi", psi), numeric("gamma", gamma)
         single = all(x.ndim == 0 for x in given)
         count = max((x.size for x in given if x.ndim), default=1)
         first, second = (np.full(count, x) if x.ndim == 0 else x for x in given)
         x = checked("psi", first, (None,))
         y = checked("gamma", second, x.shape)
-        pose = position(self, x, y, mode=mode)
+        pose = position(self.lengths, x, y, mode=mode)
         q = np.stack([y, pose.phi - y, x, pose.theta - x], axis=-1)
         return np.asarray(q[0] if single else q)
 

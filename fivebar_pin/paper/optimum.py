@@ -15,7 +15,7 @@ from fivebar_pin.paper.linkage import FiveBar
 from fivebar_pin.paper.polar import Problem, Stationary, alone, climb
 from fivebar_pin.paper.starts import balanced_points, mixtures, only_point
 
-__all__ = ["Optimum", "balance", "balance_masses"]
+__all__ = ["Optimum", "balance_mass_centres", "balance_masses"]
 
 Bounds = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -66,7 +66,7 @@ class Optimum(Immutable):
 
 
 @finite(open=("bound_multipliers", "curvature", "multipliers"))
-def balance(
+def balance_mass_centres(
     linkage: FiveBar,
     *,
     weights: tuple[float, float] = (0.5, 0.5),
@@ -119,7 +119,7 @@ def balance_masses(
         mass_bounds: lowest and highest mass of each link, scalars or (4,) each [kg]; the lowest must be positive, the
             highest may be infinite.
         total_mass: sum of the four masses [kg].
-        weights, rho_bounds, tolerance: as for `balance`.
+        weights, rho_bounds, tolerance: as for `balance_mass_centres`.
 
     Raises:
         InvalidInputError: weights outside (78), bounds in the wrong order or not positive.

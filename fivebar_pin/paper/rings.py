@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.paper.linkage import CArray
+from fivebar_pin.paper.positions import CArray
 
 __all__ = ["common_points"]
 

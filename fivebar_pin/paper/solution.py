@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, finite, frozen
-from fivebar_pin.paper.linkage import AssemblyMode, CArray, FiveBar
+from fivebar_pin.paper.assembly_mode import AssemblyMode
+from fivebar_pin.paper.linkage import FiveBar
+from fivebar_pin.paper.positions import CArray
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Solution"]

@@ -8,8 +8,8 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import InfeasibleError
-from fivebar_pin.paper.linkage import CArray
 from fivebar_pin.paper.polar import Problem
+from fivebar_pin.paper.positions import CArray
 from fivebar_pin.paper.rings import common_points
 
 __all__ = ["balanced_points", "mixtures", "only_point"]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
 from fivebar_pin.viz._geometry import Poses, View, body_points
-from fivebar_pin.viz._record import Colour
+from fivebar_pin.viz._recording import Colour
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain, Visual

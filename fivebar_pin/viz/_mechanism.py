@@ -20,7 +20,7 @@ from fivebar_pin.viz._drawing import (
     safe,
 )
 from fivebar_pin.viz._geometry import JointShape, body_points, joint_shapes
-from fivebar_pin.viz._record import Recorder, along, pose
+from fivebar_pin.viz._recording import Recorder, along, pose
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain

@@ -15,7 +15,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, body_names, ground_closures, is_counterweight
-from fivebar_pin.viz._record import Colour, Recorder
+from fivebar_pin.viz._recording import Colour, Recorder
 from fivebar_pin.viz._stage import Stage
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.viz._drawing import Drawing, amid_ground, reach
 from fivebar_pin.viz._geometry import View
-from fivebar_pin.viz._record import Colour, Recorder
+from fivebar_pin.viz._recording import Colour, Recorder
 
 __all__ = ["MECHANISMS", "Stage"]
 

@@ -19,7 +19,7 @@ from fivebar_pin.viz._drawing import Drawing, reach, safe
 from fivebar_pin.viz._geometry import View, compute_poses, find_view
 from fivebar_pin.viz._mechanism import draw_mechanism
 from fivebar_pin.viz._page import describe, render
-from fivebar_pin.viz._record import Recorder, pose
+from fivebar_pin.viz._recording import Recorder, pose
 from fivebar_pin.viz._stage import MECHANISMS, Stage
 
 if TYPE_CHECKING:

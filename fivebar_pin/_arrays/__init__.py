@@ -1,0 +1,29 @@
+"""Array habits: check once at the boundary, copy in, freeze; write round-off as what it is."""
+
+from fivebar_pin._arrays.algebra import block_svd, cross, skew
+from fivebar_pin._arrays.checks import all_of, checked, integer, number, numeric, reals, require_memory
+from fivebar_pin._arrays.immutable import Array, Immutable, frozen, seal
+from fivebar_pin._arrays.results import finite
+from fivebar_pin._arrays.rounding import ROUND_OFF, figures, settled, table_text
+
+__all__ = [
+    "ROUND_OFF",
+    "Array",
+    "Immutable",
+    "all_of",
+    "block_svd",
+    "checked",
+    "cross",
+    "figures",
+    "finite",
+    "frozen",
+    "integer",
+    "number",
+    "numeric",
+    "reals",
+    "require_memory",
+    "seal",
+    "settled",
+    "skew",
+    "table_text",
+]

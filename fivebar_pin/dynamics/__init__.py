@@ -1,0 +1,16 @@
+"""Constrained dynamics: torques, what shakes the frame and what it carries, reactions, accelerations, energy."""
+
+from fivebar_pin.dynamics.energy import EnergyBalance, energy_balance
+from fivebar_pin.dynamics.forward import forward_dynamics
+from fivebar_pin.dynamics.inverse import inverse_dynamics
+from fivebar_pin.dynamics.loads import Loads
+from fivebar_pin.dynamics.reactions import Reactions
+
+__all__ = [
+    "EnergyBalance",
+    "Loads",
+    "Reactions",
+    "energy_balance",
+    "forward_dynamics",
+    "inverse_dynamics",
+]

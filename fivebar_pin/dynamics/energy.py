@@ -1,0 +1,121 @@
+"""Where the energy of a motion goes: stored, supplied by motors and from outside, lost in dampers and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, numeric
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.dynamics.bodies import Bodies, body_rates, gravity_wrenches
+from fivebar_pin.dynamics.equations import System, checked_wrench
+from fivebar_pin.springs import JointSpring, Spring
+from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["EnergyBalance", "energy_balance"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnergyBalance(Immutable):
+    """Energies [J] and powers [W] along a trajectory, n samples.
+
+    Attributes:
+        kinetic: of the bodies (n,).
+        rotor: kinetic, of the rotors where joints have an armature (n,).
+        potential: of gravity, zero at the world origin (n,).
+        elastic: stored in springs (n,).
+        kinetic_rate, rotor_rate: of the two, from the accelerations (n,).
+        stored_rate: of potential and elastic energy together (n,).
+        supplied: by the motors and the forces from outside (n,).
+        dissipated: by joint damping, dry friction and the springs' dampers (n,).
+        exchanged: sizes of all powers together, body by body (n,); the scale of the residual.
+    """
+
+    kinetic: Array
+    rotor: Array
+    potential: Array
+    elastic: Array
+    kinetic_rate: Array
+    rotor_rate: Array
+    stored_rate: Array
+    supplied: Array
+    dissipated: Array
+    exchanged: Array
+
+    @property
+    def total(self) -> Array:
+        """Kinetic energy of bodies and rotors, potential and elastic energy together (n,) [J]."""
+        return np.asarray(self.kinetic + self.rotor + self.potential + self.elastic)
+
+    def drift(self) -> float:
+        """Return the largest change of the total energy since the first sample, relative to the energy in play [-].
+
+        The energy in play is the largest kinetic energy plus the range of the stored energy. Zero in exact arithmetic
+        when nothing is supplied or dissipated.
+        """
+        stored = self.potential + self.elastic
+        scale = float((self.kinetic + self.rotor).max() + np.ptp(stored))
+        return float(np.abs(self.total - self.total[0]).max()) / max(scale, 1e-300)
+
+    def residual(self) -> float:
+        """Return the largest mismatch of the rates: kinetic + rotor + stored = supplied - dissipated, relative [-]."""
+        mismatch = np.abs(self.kinetic_rate + self.rotor_rate + self.stored_rate - self.supplied + self.dissipated)
+        return float(mismatch.max() / max(float(self.exchanged.max()), 1e-300))
+
+
+@finite()
+def energy_balance(
+    chain: ClosedChain,
+    trajectory: Trajectory,
+    *,
+    torque: npt.ArrayLike | None = None,
+    springs: Iterable[Spring | JointSpring] = (),
+    external: Mapping[str, npt.ArrayLike] | None = None,
+) -> EnergyBalance:
+    """Account for the energy along a trajectory, body by body.
+
+    Args:
+        chain: the mechanism.
+        trajectory: of this chain.
+        torque: of the actuated joints (na,) or (n, na), as it was applied [N m or N]; None for none.
+        springs: as they were simulated.
+        external: wrenches (6,) or (n, 6) by frame, as they were applied.
+
+    Returns:
+        Energies, their rate, and the powers supplied and dissipated.
+    """
+    system, n, v = System.of(chain, tuple(springs)), len(trajectory), trajectory.v
+    given = np.zeros(chain.na) if torque is None else numeric("torque", torque)
+    tau = checked(
+        "torque", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na)
+    )
+    point = system.manifold.at(np.asarray(trajectory.q))
+    tree = system.manifold.loops.tree
+    bodies = Bodies.of(chain)
+    moving = body_rates(tree, bodies, point.poses, tree.rates(trajectory.q, v, point.poses), trajectory.a)
+    gravity = np.array(chain.model.gravity.linear)
+    weight = gravity_wrenches(bodies, moving.centre, gravity)
+    armature = np.array(chain.model.armature)
+    sprung = system.spring_forces(point, v)
+    applied = system.wrench_forces(point, checked_wrench(chain, external, n))
+    rotors = armature * v
+    inertial = np.sum(moving.rate * moving.twist, axis=2)  # (n, nb)
+    heavy = np.sum(weight * moving.twist, axis=2)
+    driven = np.column_stack([tau * v[:, chain.actuated_index], applied * v])
+    dissipated = np.sum(system.damping * v * v + system.friction * np.abs(v), axis=1) + sprung.dissipation
+    gross = [inertial, heavy, driven, sprung.force * v, dissipated[:, None]]
+    return EnergyBalance(
+        kinetic=frozen(0.5 * np.sum(moving.twist * moving.momentum, axis=(1, 2))),
+        rotor=frozen(0.5 * np.sum(rotors * v, axis=1)),
+        potential=frozen(-np.einsum("nbi,i,b->n", moving.centre, gravity, bodies.mass)),
+        elastic=frozen(sprung.energy),
+        kinetic_rate=frozen(inertial.sum(axis=1)),
+        rotor_rate=frozen(np.sum(rotors * trajectory.a, axis=1)),
+        stored_rate=frozen(-heavy.sum(axis=1) - np.sum(sprung.force * v, axis=1) - sprung.dissipation),
+        supplied=frozen(driven.sum(axis=1)),
+        dissipated=frozen(dissipated),
+        exchanged=frozen(np.sum([np.abs(x).sum(axis=1) for x in gross], axis=0)),
+    )

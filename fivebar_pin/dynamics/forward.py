@@ -1,0 +1,107 @@
+"""Forward dynamics of any closed chain, driven, under-driven or free.
+
+Accelerations come from the null space of the closure Jacobian, so every mobility is handled alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, checked, finite, numeric
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.dynamics.equations import System, checked_wrench
+from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.mechanism.manifold import Point
+from fivebar_pin.springs import JointSpring, Spring
+
+__all__ = ["constant_torque", "forward_dynamics", "require_consistent"]
+
+
+_CLOSED = 1e-8  # closure residual and velocity mismatch that a given state may have [-]
+
+
+@finite()
+def forward_dynamics(
+    chain: ClosedChain,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    tau: npt.ArrayLike | None = None,
+    *,
+    external: Mapping[str, npt.ArrayLike] | None = None,
+    springs: Iterable[Spring | JointSpring] = (),
+) -> Array:
+    """Compute the joint accelerations of the closed chain, a = N w + a_c with (N^T M N) w = N^T (...).
+
+    Gravity, armature, viscous damping and dry friction are taken from the chain's model; dry friction is -f sign(v),
+    none at rest, as in `inverse_dynamics` (`simulate` lets joints stick). The mechanism may have any number of motors:
+    the tangent space of the closures is used, not the actuated joints.
+
+    Args:
+        chain: the mechanism.
+        q: closed configuration (nq,) or (n, nq).
+        v: velocity that keeps it closed (nv,) or (n, nv).
+        tau: torque of the actuated joints (na,) or (n, na), one number where there is one motor [N m or N]; no torque
+            unless given.
+        external: forces from outside: frame name -> wrench (6,) or (n, 6), force [N] and moment [N m] in world axes at
+            the frame's origin.
+        springs: springs and dampers.
+
+    Returns:
+        Accelerations (nv,) or (n, nv) [rad/s2 or m/s2].
+
+    Raises:
+        InvalidInputError: wrong shapes; q not closed or v not consistent with the closures; a motion without inertia.
+        SingularityError: q is a bifurcation, where the motion is not determined.
+    """
+    system = System.of(chain, tuple(springs))
+    Q = numeric("q", q)
+    single = Q.ndim == 1
+    Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
+    n = Q.shape[0]
+    V = checked("v", np.atleast_2d(numeric("v", v)), (n, chain.nv))
+    if not n:
+        return np.zeros((0, chain.nv))
+    given = constant_torque(chain, tau)
+    T = checked("tau", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na))
+    point = system.manifold.at(Q)
+    require_consistent(system, point, V)
+    applied = system.wrench_forces(point, checked_wrench(chain, external, n))
+    applied[:, chain.actuated_index] += T
+    a = system.accelerations(point, V, applied, system.manifold.rank_of(point))
+    return np.asarray(a[0]) if single else a
+
+
+def constant_torque(chain: ClosedChain, tau: npt.ArrayLike | None) -> Array:
+    """Return a constant torque as an array: zeros where none is given, one number as that of the only motor."""
+    given = np.zeros(chain.na) if tau is None else numeric("tau", tau)
+    return given.reshape(1) if given.ndim == 0 and chain.na == 1 else given
+
+
+def require_consistent(system: System, point: Point, v: Array) -> None:
+    loops, scale = system.manifold.loops, system.manifold.scale
+    if not loops.m:
+        return
+    gap = np.abs(point.residual).max(axis=1)
+    worst = int(np.argmax(gap))
+    if gap[worst] > _CLOSED * max(1.0, loops.length):
+        name, size = loops.worst(point.residual[worst])
+        raise InvalidInputError(
+            f"closure {name} at state {worst}",
+            size,
+            f"must be below {_CLOSED:g} m or rad",
+            "Use assemble, or simulate(initial='project').",
+        )
+    u = v / scale
+    rate = np.abs(point.s * np.einsum("nrk,nk->nr", point.Vt[:, : point.s.shape[1]], u)).max(axis=1)
+    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), 1e-300)
+    worst = int(np.argmax(rate - bound))
+    if rate[worst] > bound[worst]:
+        raise InvalidInputError(
+            f"rate of the closures at state {worst}",
+            float(rate[worst]),
+            "must vanish: this velocity opens the loops",
+            "Use v = complement(chain, q) @ v_actuated, or simulate(initial='project').",
+        )

@@ -1,0 +1,14 @@
+"""Constrained kinematics: assemble, drive, complement."""
+
+from fivebar_pin.kinematics.assemble import assemble, closure_residual
+from fivebar_pin.kinematics.complement import complement
+from fivebar_pin.kinematics.drive import drive
+from fivebar_pin.kinematics.modes import assembly_modes
+
+__all__ = [
+    "assemble",
+    "assembly_modes",
+    "closure_residual",
+    "complement",
+    "drive",
+]

@@ -1,0 +1,157 @@
+"""Configurations that close all loops."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import AssemblyError, SingularityError
+from fivebar_pin.kinematics.branch import SINGULAR, follow, node_at
+from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
+from fivebar_pin.mechanism.newton import closed_enough, polish, residual_of, search
+
+__all__ = ["CLOSED", "assemble", "checked_search", "closed_from_starts", "closure_residual"]
+
+
+CLOSED = 1e-12  # closure residual that counts as closed [m or rad]
+_NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
+_MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once
+
+
+@finite()
+def assemble(
+    chain: ClosedChain,
+    q_actuated: npt.ArrayLike,
+    near: npt.ArrayLike | None = None,
+    *,
+    starts: int = 64,
+    seed: int = 0,
+    tolerance: float = CLOSED,
+) -> Array:
+    """Find the configuration that closes all loops for given actuated coordinates.
+
+    Args:
+        chain: the mechanism.
+        q_actuated: actuated coordinates (na,) or (n, na), order of `chain.actuated` [rad or m].
+        near: a configuration (nq,). When it is itself closed, its assembly mode is followed from there along the
+            straight line of actuated coordinates; otherwise a damped, step-limited search starts at it.
+            Without it the model's named configurations (`chain.references`), the neutral and random ones are tried.
+        starts: number of random starts when `near` is not given.
+        seed: of the random starts.
+        tolerance: closure residual to reach [m or rad; relative to the chain's length above 1 m].
+
+    Returns:
+        The configuration (nq,) or (n, nq).
+
+    Raises:
+        AssemblyError: the loops do not close; names the closure that stays open and by how much.
+        SingularityError: the way from `near` is blocked by a singularity.
+    """
+    loops = checked_search(chain, starts, seed, tolerance)
+    x = numeric("q_actuated", q_actuated)
+    if x.ndim == 2:
+        each = [assemble(chain, row, near, starts=starts, seed=seed, tolerance=tolerance) for row in x]
+        return np.stack(each) if each else np.zeros((0, chain.nq))
+    x = checked("q_actuated", x, (chain.na,))
+    if near is not None:
+        return _assemble_near(loops, x, checked("near", near, (chain.nq,)), tolerance)
+    for reference in chain.references.values():
+        with contextlib.suppress(AssemblyError, SingularityError):
+            return _assemble_near(loops, x, reference, tolerance)
+    q, residual = closed_from_starts(chain, loops, x, starts, seed, tolerance)
+    if not q.shape[0]:
+        raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")
+    return np.asarray(q[0])
+
+
+@finite()
+def closure_residual(chain: ClosedChain, q: npt.ArrayLike) -> Array:
+    """Return every closure row at q: (nq,) -> (m,) or (n, nq) -> (n, m) [m, rad], axes of frame 1."""
+    loops = loops_of(chain)
+    Q = numeric("q", q)
+    single = Q.ndim == 1
+    Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
+    if not loops.m:
+        return np.zeros((0,) if single else (Q.shape[0], 0))
+    residual = residual_of(loops, Q)
+    return np.asarray(residual[0]) if single else residual
+
+
+def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float) -> Loops:
+    """Return the prepared loops once the numbers of a search have been looked at."""
+    integer("starts", starts, least=1, most=_MOST_STARTS)
+    integer("seed", seed)
+    number("tolerance", tolerance, positive=True)
+    loops = loops_of(chain)
+    loops.require_determined()
+    return loops
+
+
+def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Array:
+    q = np.array(near[None])
+    if closed_enough(loops, np.abs(residual_of(loops, q)).max(axis=1, initial=0.0), 1e-8)[0] if loops.m else False:
+        at = _actuated_at(loops, q, x)
+        node = node_at(loops, q[0], at)
+        if node.sigma >= SINGULAR:
+            closed = polish(loops, follow(loops, node, x).q[None])
+            if not closed_enough(loops, closed.residual, tolerance)[0]:
+                raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
+            loops.set_actuated(closed.q, x)
+            return np.asarray(closed.q[0])
+    loops.set_actuated(q, x)
+    if not loops.m:
+        return np.asarray(q[0])
+    for starts in (q, _nudged(loops, q, x)):  # a search that starts at a saddle stays there: step aside
+        found = search(loops, starts)
+        closed = polish(loops, found)
+        opposed = loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
+        good = np.flatnonzero(closed_enough(loops, closed.residual, tolerance) & ~opposed)
+        if good.size:
+            away = loops.tree.difference(q, closed.q[good]) / loops.column_scale
+            return np.asarray(closed.q[good[int(np.argmin(np.abs(away).max(axis=1)))]])
+    raise open_message(loops, _smallest(residual_of(loops, found)), f"at the actuated coordinates {x.tolist()}")
+
+
+def _nudged(loops: Loops, q: Array, x: Array) -> Array:
+    """Return starts (k, nq) about q (1, nq)."""
+    rng = np.random.default_rng(0)
+    tangent = _NUDGE * rng.uniform(-1.0, 1.0, (_NUDGES, loops.tree.nv)) * loops.column_scale
+    starts = loops.tree.integrate(np.repeat(q, _NUDGES, axis=0), tangent)
+    loops.set_actuated(starts, x)
+    return starts
+
+
+def _actuated_at(loops: Loops, q: Array, x: Array) -> Array:
+    """Return the actuated coordinates (na,) of q (1, nq); unbounded joints count from the turn nearest to x."""
+    at = loops.actuated_of(q)[0]
+    turn = 2.0 * np.pi * np.array([loops.tree.is_cyclic(int(k)) for k in loops.actuated], dtype=np.float64)
+    return np.asarray(at + turn * np.round((x - at) / (2.0 * np.pi)))
+
+
+def closed_from_starts(
+    chain: ClosedChain, loops: Loops, x: Array, starts: int, seed: int, tolerance: float
+) -> tuple[Array, Array]:
+    """Return the closed configurations (k, nq) reached from several starts, and the smallest residual (m,)."""
+    import pinocchio as pin
+
+    rng = np.random.default_rng(seed)
+    tangent = rng.uniform(-np.pi, np.pi, (starts, loops.tree.nv)) * loops.column_scale
+    tangent[0] = 0.0
+    q = loops.tree.integrate(np.repeat(pin.neutral(chain.model)[None], starts, axis=0), tangent)
+    loops.set_actuated(q, x)
+    if not loops.m:
+        return q[:1], np.zeros(0)
+    found = search(loops, q)
+    closed = polish(loops, found)
+    good = closed_enough(loops, closed.residual, tolerance)
+    good &= ~loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
+    return closed.q[good], _smallest(residual_of(loops, found))
+
+
+def _smallest(residual: Array) -> Array:
+    """Return the residual (m,) of the best of several configurations (k, m)."""
+    return np.asarray(residual[int(np.argmin(np.linalg.norm(residual, axis=1)))])

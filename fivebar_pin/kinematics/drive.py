@@ -1,0 +1,108 @@
+"""The whole mechanism from the motion of its actuated joints."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fivebar_pin._arrays import Array, finite
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
+from fivebar_pin.kinematics.assemble import CLOSED, assemble
+from fivebar_pin.kinematics.branch import track
+from fivebar_pin.kinematics.complement import whole_complement
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.motion import Motion
+from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["consistent", "drive"]
+
+
+_BLOCK = 4096  # samples worked on at a time, so that intermediate arrays stay in cache
+
+
+@finite()
+def drive(
+    chain: ClosedChain,
+    motion: Motion,
+    near: npt.ArrayLike | None = None,
+    *,
+    tolerance: float = CLOSED,
+    limits: Literal["check", "ignore"] = "check",
+) -> Trajectory:
+    """Move the whole mechanism from the motion of its actuated joints, on one assembly mode.
+
+    Args:
+        chain: the mechanism.
+        motion: of the actuated joints, columns in the order of `chain.actuated`.
+        near: configuration (nq,) that picks the assembly mode, see `assemble`.
+        tolerance: closure residual to reach [m or rad; relative to the chain's length above 1 m].
+        limits: whether the joint limits of the model are checked.
+
+    Returns:
+        q, v, a of all joints, consistent with each other, the complement N and the closure residual.
+
+    Raises:
+        AssemblyError: a sample out of reach; names sample, time, closure and gap.
+        BranchError: the motion cannot be followed without changing the assembly mode.
+        SingularityError: the motion meets a type 2 singularity; names sample and time.
+        InvalidInputError: motion of the wrong width, joint limits passed, motion left undetermined.
+    """
+    loops = loops_of(chain)
+    loops.require_determined()
+    if motion.na != chain.na:
+        raise InvalidInputError(
+            "motion columns", motion.na, f"must be {chain.na}, one for each of {', '.join(chain.actuated)}"
+        )
+    try:
+        q0 = assemble(chain, motion.q[0], near, tolerance=tolerance)
+        closed = track(loops, q0, motion.q, tolerance)
+    except (AssemblyError, SingularityError) as error:
+        raise _with_time(error, motion) from None
+    if limits == "check":
+        _check_limits(chain, closed.q, motion)
+    parts = [
+        consistent(loops, closed.q[k : k + _BLOCK], motion.v[k : k + _BLOCK], motion.a[k : k + _BLOCK])
+        for k in range(0, len(motion), _BLOCK)
+    ]
+    v, a, N = (np.concatenate(x) if len(parts) > 1 else x[0] for x in zip(*parts, strict=True))
+    return Trajectory(motion.t, closed.q, v, a, N, closed.residual)
+
+
+def consistent(loops: Loops, q: Array, va: Array, aa: Array) -> tuple[Array, Array, Array]:
+    """Return v, a (n, nv) and N (n, nv, na) from the actuated rates."""
+    poses = loops.tree.poses(q)
+    pairs = loops.pairs(poses)
+    blocks = loops.blocks(poses, pairs)
+    passive = loops.passive_map(blocks)
+    N = whole_complement(loops, passive, blocks, q.shape[0])
+    v = np.matmul(N, va[..., None])[..., 0]
+    a = np.matmul(N, aa[..., None])[..., 0]
+    if loops.m:
+        a[:, loops.passive] -= passive.solve(loops.drift(pairs, loops.tree.rates(q, v, poses)))
+    return v, a, N
+
+
+def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
+    lower, upper = chain.model.lowerPositionLimit, chain.model.upperPositionLimit
+    slack = 1e-9
+    bad = np.argwhere((q < lower - slack) | (q > upper + slack))
+    if bad.size:
+        k, i = (int(b) for b in bad[0])
+        owner = int(np.searchsorted(np.array(chain.model.idx_qs)[1:], i, side="right"))
+        raise InvalidInputError(
+            f"joint {chain.model.names[owner]} at sample {k} (t = {motion.t[k]:.6g} s)",
+            float(q[k, i]),
+            f"must stay within its limits [{lower[i]:.6g}, {upper[i]:.6g}]",
+            "Change the motion, or pass limits='ignore'.",
+        )
+
+
+def _with_time(error: AssemblyError | SingularityError, motion: Motion) -> AssemblyError | SingularityError:
+    """Say at which sample and time it happened."""
+    k = error.sample if error.sample is not None else 0
+    error.sample, error.time = k, float(motion.t[k])
+    error.args = (f"sample {k} (t = {motion.t[k]:.6g} s): {error.args[0]}",)
+    return error

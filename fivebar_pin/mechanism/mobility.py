@@ -1,0 +1,252 @@
+"""Closed configurations of a chain whichever joints are driven, and what its closures do there.
+
+Every decision about rank is made by `Loops.rank`; here its consequences are given names.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array, block_svd
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.newton import closed_enough, residual_of, search
+
+__all__ = [
+    "Site",
+    "close",
+    "determining_sets",
+    "first_closed",
+    "gap",
+    "generic_site",
+    "held",
+    "passive_sigma",
+    "redundant_combinations",
+    "site_at",
+]
+
+
+_TRUNCATE = 1e-6  # singular values below this part of the largest are left out of a Newton step [-]
+_STARTS = 48  # random starts when no configuration is given
+_WALKERS, _STRIDES = 8, 2  # samples and steps of the walk that finds generic configurations
+_ENTRIES = 400_000  # numbers in the Jacobians of all of them at a time
+_STRIDE = 0.4  # length of its steps [rad, or chain lengths]
+_MANY = 2000  # combinations of joints beyond which only a good one is looked for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Site:
+    """The closures at one configuration.
+
+    Attributes:
+        q: configuration (nq,).
+        J: closure Jacobian (m, nv).
+        rank: its rank.
+        free: orthonormal basis of the scaled velocities it allows (nv, nv - rank).
+    """
+
+    q: Array
+    J: Array
+    rank: int
+    free: Array
+
+
+def site_at(loops: Loops, q: Array) -> Site:
+    """Evaluate the closures at q (nq,)."""
+    nv = loops.tree.nv
+    if not loops.m:
+        return Site(q, np.zeros((0, nv)), 0, np.eye(nv))
+    poses = loops.tree.poses(q[None])
+    J = loops.jacobian(poses, loops.pairs(poses))[0]
+    rank = loops.rank(J)
+    _, _, Vt = block_svd(loops.row_scale[:, None] * J * loops.column_scale)
+    return Site(q, J, rank, Vt[rank:].T)
+
+
+def gap(loops: Loops, q: Array) -> Array:
+    """Return the largest closure residual at configurations q (n, nq) -> (n,) [m or rad]."""
+    return np.abs(residual_of(loops, q)).max(axis=1, initial=0.0) if loops.m else np.zeros(q.shape[0])
+
+
+def close(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]:
+    """Close the loops from starts q (n, nq) with every coordinate free to move.
+
+    Returns:
+        Configurations (n, nq) and their largest residual (n,), infinite where a hinge closed back to front.
+    """
+    loops = loops_of(chain.with_actuated(()))
+    if not loops.m or not loops.tree.nv:
+        return q, gap(loops, q)
+    good = closed_enough(loops, gap(loops, q), tolerance)
+    q = np.array(q)
+    if not good.all():
+        q[~good] = search(loops, q[~good])
+    for _ in range(8):
+        poses = loops.tree.poses(q)
+        pairs = loops.pairs(poses)
+        residual = loops.residual(pairs) * loops.row_scale
+        step = np.zeros((q.shape[0], loops.tree.nv))
+        for g, block in zip(loops.independent, loops.blocks(poses, pairs), strict=True):
+            scaled = loops.row_scale[g.rows, None] * block * loops.column_scale[g.columns]
+            inverse = np.linalg.pinv(scaled, rcond=_TRUNCATE)
+            step[:, g.columns] = -np.matmul(inverse, residual[:, g.rows, None])[..., 0]
+        step[good] = 0.0
+        q = loops.tree.integrate(q, np.clip(step, -0.5, 0.5) * loops.column_scale)
+    residual = gap(loops, q)
+    residual[loops.opposed(loops.pairs(loops.tree.poses(q)))] = np.inf
+    return q, residual
+
+
+def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array, float]:
+    """Find a closed configuration from the neutral one, else from random ones; the best one found if none closes.
+
+    Returns:
+        The configuration (nq,) and its largest residual [m or rad].
+    """
+    loops = loops_of(chain)
+    neutral = np.array(pin.neutral(chain.model))
+    best, residual = close(chain, neutral[None], tolerance)
+    if closed_enough(loops, residual, tolerance)[0]:
+        return best[0], float(gap(loops, best)[0])
+    rng, count = np.random.default_rng(seed), _affordable(_STARTS, loops)
+    tangent = rng.uniform(-np.pi, np.pi, (count, loops.tree.nv)) * loops.column_scale
+    q, sizes = close(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), tolerance)
+    q, sizes = np.concatenate([best, q]), np.concatenate([residual, sizes])
+    k = int(np.argmin(sizes))
+    return q[k], float(gap(loops, q[k : k + 1])[0])
+
+
+def _affordable(count: int, loops: Loops) -> int:
+    """Return how many configurations to work on at a time: fewer where each takes a large matrix."""
+    return max(1, min(count, _ENTRIES // max(1, loops.m * loops.tree.nv)))
+
+
+def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) -> Site:
+    """Walk away from a closed configuration along what the closures allow; return the most regular site met there.
+
+    The rank of the closures is highest at almost every configuration and drops at singular ones, where branches of
+    different character may meet: those that the actuated joints can drive come first.
+    """
+    loops = loops_of(chain)
+    if not loops.m or not site.free.shape[1]:
+        return site
+    rng = np.random.default_rng(seed)
+    best, score = site, _score(loops, site)
+    walkers = _affordable(_WALKERS, loops)
+    here = [site] * walkers
+    for _ in range(_STRIDES):
+        steps = [s.free @ rng.normal(size=s.free.shape[1]) for s in here]
+        tangent = np.stack([_STRIDE * d / max(float(np.abs(d).max()), 1e-300) for d in steps]) * loops.column_scale
+        start = loops.tree.integrate(np.stack([s.q for s in here]), tangent)
+        q, residual = close(chain, start, tolerance)
+        closed = closed_enough(loops, residual, tolerance)
+        here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(walkers)]
+        for candidate in here:
+            new = _score(loops, candidate)
+            if candidate is not site and (new > score or (best is site and new[:2] == score[:2])):
+                best, score = candidate, new
+    return best
+
+
+def _score(loops: Loops, site: Site) -> tuple[int, int, float]:
+    """Return the rank, the rank with the actuated joints held, and the smallest singular value that counts."""
+    s = loops.singular_values(site.J)
+    return site.rank, loops.rank(held(site.J, loops.actuated)), float(s[site.rank - 1]) if site.rank else 0.0
+
+
+def held(J: Array, joints: npt.NDArray[np.intp]) -> Array:
+    """Return the closure Jacobian (m, nv) with the given velocity coordinates held."""
+    out = np.array(J)
+    out[:, joints] = 0.0
+    return out
+
+
+def redundant_combinations(loops: Loops, site: Site) -> tuple[Array, Array]:
+    """Return the row combinations that vanish at every configuration, and those that vanish at this site besides.
+
+    Each (k, m), over the scaled rows, in echelon form: every row has a one at its own pivot.
+    """
+    if not loops.m:
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    kept = loops.reduce / loops.row_scale  # orthonormal rows
+    always = _complement_rows(kept, loops.m - loops.r)
+    U, _, _ = block_svd(loops.row_scale[:, None] * site.J * loops.column_scale)
+    null = U[:, site.rank :].T
+    extra = null.shape[0] - always.shape[0]
+    outside = null - null @ always.T @ always
+    here = block_svd(outside)[2][:extra] if extra > 0 else np.zeros((0, null.shape[1]))
+    return _echelon(always), _echelon(here)
+
+
+def _complement_rows(kept: Array, count: int) -> Array:
+    m = kept.shape[1]
+    return block_svd(kept)[2][m - count :] if count else np.zeros((0, m))
+
+
+def _echelon(rows: Array) -> Array:
+    """Reduce by Gauss and Jordan with complete pivoting; round-off is set to zero."""
+    out = np.array(rows)
+    done: list[int] = []
+    for i in range(out.shape[0]):
+        rest = np.abs(out[i:])
+        rest[:, done] = 0.0
+        at = np.unravel_index(int(np.argmax(np.round(rest, 9))), rest.shape)
+        pivot_row, pivot = i + int(at[0]), int(at[1])
+        out[[i, pivot_row]] = out[[pivot_row, i]]
+        out[i] /= out[i, pivot]
+        for k in range(out.shape[0]):
+            if k != i:
+                out[k] -= out[k, pivot] * out[i]
+        done.append(pivot)
+    out[np.abs(out) < 1e-8] = 0.0
+    return out
+
+
+def passive_sigma(loops: Loops, J: Array, actuated: npt.NDArray[np.intp]) -> float:
+    """Return the smallest singular value of the scaled passive columns of J, 0 where they lack rank [-]."""
+    passive = np.setdiff1d(np.arange(loops.tree.nv), actuated)
+    if not passive.size:
+        return 1.0
+    Jp = held(J, actuated)
+    return float(loops.singular_values(Jp)[passive.size - 1]) if loops.rank(Jp) == passive.size else 0.0
+
+
+def determining_sets(chain: ClosedChain, site: Site, most: int) -> list[tuple[tuple[str, ...], float]]:
+    """List sets of one-degree-of-freedom joints that determine the motion at a site, the best conditioned first."""
+    loops, model = loops_of(chain), chain.model
+    mobility = chain.nv - site.rank
+    single = [j for j in range(1, model.njoints) if model.joints[j].nv == 1]
+    if not mobility or mobility > len(single):
+        return []
+    columns = {j: int(model.idx_vs[j]) for j in single}
+    if math.comb(len(single), mobility) <= _MANY:
+        combinations = list(itertools.combinations(single, mobility))
+    else:
+        combinations = [_greedy(site.free, columns)]
+    out = []
+    for joints in combinations:
+        sigma = passive_sigma(loops, site.J, np.array([columns[j] for j in joints]))
+        if sigma > 0.0:
+            out.append((tuple(model.names[j] for j in joints), sigma))
+    out.sort(key=lambda item: -round(item[1], 12))
+    return out[:most]
+
+
+def _greedy(free: Array, columns: dict[int, int]) -> tuple[int, ...]:
+    """Pick one set by pivoting: at each turn the joint that moves most while the chosen ones are held."""
+    basis, chosen = np.array(free), []
+    left = dict(columns)
+    for _ in range(free.shape[1]):
+        joint = max(left, key=lambda j: float(np.linalg.norm(basis[left[j]])))
+        row = basis[left.pop(joint)]
+        size = float(row @ row)
+        if size > 0.0:
+            basis = basis - np.outer(basis @ row, row) / size
+        chosen.append(joint)
+    return tuple(sorted(chosen))

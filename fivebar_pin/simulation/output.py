@@ -1,0 +1,110 @@
+"""The output of a simulation: states at the asked times, between the steps of the integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.dynamics.equations import System
+from fivebar_pin.mechanism.manifold import Point
+from fivebar_pin.simulation.chart_motion import ChartMotion, Node, between, failure, sigma_of
+from fivebar_pin.simulation.singular_step import lagrange
+from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["Interpolant", "Record"]
+
+
+Interpolant = Callable[[float], Array]
+
+_CLOSE = 0.03  # scaled singular value below which a sample is interpolated from its neighbours, at most [-]
+_DIP = 0.2  # the same, of the larger value at the two ends of the step
+_THROUGH = 20  # states that such an interpolation goes through
+_DETERMINED = 1e-12  # scaled slope of the actuated joints below which they do not determine the motion [-]
+
+
+class Record:
+    """The output samples, filled as the integration passes them."""
+
+    def __init__(self, system: System, times: Array) -> None:
+        n, chain = times.size, system.chain
+        self.system, self.times, self.done = system, times, 0
+        self.q, self.v, self.a = np.empty((n, chain.nq)), np.empty((n, chain.nv)), np.empty((n, chain.nv))
+        self.residual = np.zeros(n)
+
+    def put(self, k: int, point: Point, v: Array, a: Array) -> None:
+        self.q[k], self.v[k], self.a[k] = point.q[0], v, a
+        self.residual[k] = np.abs(point.residual).max(initial=0.0)
+        self.done = k + 1
+
+    def fill(self, motion: ChartMotion, interpolant: Callable[[], Interpolant], node: Node, reached: Node) -> None:
+        """Fill the samples after a node, up to the next one."""
+        dense: Interpolant | None = None
+        across: _Across | None = None
+        while self.done < self.times.size and self.times[self.done] <= reached.t:
+            t = float(self.times[self.done])
+            if t == reached.t:
+                self.put(self.done, reached.point, reached.v, reached.a)
+                continue
+            dense = dense or interpolant()
+            found = motion.state(t, dense(t), between(motion.system, node, reached, t))
+            if found is None or sigma_of(found[0], motion.rank) < _close(node, reached):
+                across = across or _Across(motion, dense, node, reached)
+                found = across.at(t)
+            self.put(self.done, *found)
+
+    def trajectory(self, rank: int) -> Trajectory:
+        """Return everything that was recorded."""
+        N = _complement(self.system, self.q, rank)
+        return Trajectory(self.times, self.q, self.v, self.a, N, self.residual)
+
+
+def _close(node: Node, reached: Node) -> float:
+    """Return the singular value below which round-off shows in a state between two nodes."""
+    return min(_CLOSE, _DIP * max(node.sigma, reached.sigma))
+
+
+class _Across:
+    """States of one step at and near a singular instant: independent coordinates as integrated, all others through
+    states of the step that are clear of it."""
+
+    def __init__(self, motion: ChartMotion, dense: Interpolant, node: Node, reached: Node) -> None:
+        self.motion, self.dense, self.node, self.h = motion, dense, node, reached.t - node.t
+        tree, times, rows = motion.system.manifold.loops.tree, [], []
+        for s in 0.5 - 0.5 * np.cos((np.arange(_THROUGH) + 0.5) * np.pi / _THROUGH):
+            t = node.t + s * self.h
+            found = motion.state(t, dense(t), between(motion.system, node, reached, t))
+            if found is not None and sigma_of(found[0], motion.rank) >= _close(node, reached):
+                away = tree.difference(motion.chart.q[None], found[0].q)[0]
+                rows.append(np.concatenate([away, found[1], found[2]]))
+                times.append(s)
+        if len(times) < _THROUGH // 2:
+            raise failure(node, motion.rank, "the configuration is not determined over a whole step")
+        self.times, self.rows = np.array(times), np.array(rows)
+
+    def at(self, t: float) -> tuple[Point, Array, Array]:
+        """Return point, v (nv,) and a (nv,) at a time."""
+        manifold, B = self.motion.system.manifold, self.motion.chart.B
+        dq, v, a = np.split(lagrange(np.array((t - self.node.t) / self.h), self.times) @ self.rows, 3)
+        xi, u = np.split(self.dense(t), 2)
+        dq = dq + manifold.scale * (B @ (xi - B.T @ (dq / manifold.scale)))
+        v = v + manifold.scale * (B @ (u - B.T @ (v / manifold.scale)))
+        q = manifold.loops.tree.integrate(self.motion.chart.q[None], dq[None])[0]
+        return manifold.project(q, 1e-12), v, a
+
+
+def _complement(system: System, q: Array, rank: int) -> Array:
+    """Return N (n, nv, na) of the actuated joints; nan where they do not determine the motion.
+
+    With more motors than mobility, N is the one of least torque: N^T distributes a load over the motors with the
+    least sum of squares.
+    """
+    chain, index = system.chain, system.chain.actuated_index
+    N = np.full((q.shape[0], chain.nv, chain.na), np.nan)
+    if chain.na < chain.nv - rank or not chain.na:
+        return N
+    T = np.swapaxes(system.manifold.at(q).Vt[:, rank:], 1, 2) * system.manifold.scale[:, None]  # (n, nv, f)
+    regular = np.linalg.svd(T[:, index] / system.manifold.scale[index, None], compute_uv=False)[:, -1] > _DETERMINED
+    N[regular] = np.matmul(T[regular], np.linalg.pinv(T[regular][:, index]))
+    return N

@@ -1,0 +1,230 @@
+"""Closure residual, Jacobian and drift are each other's derivatives, and Pinocchio's where it has them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from mechanisms import (
+    AT_ORIGIN,
+    TILTED,
+    add,
+    at,
+    bennett,
+    body,
+    double_four_bar,
+    five_bar,
+    four_bar,
+    point,
+    rscr,
+    rssr,
+    slider_crank,
+    welded_four_bar,
+)
+
+import fivebar_pin as fb
+from fivebar_pin.closures import ClosureKind
+from fivebar_pin.closures.closure import log3
+from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.mechanism.loops import Loops, loops_of
+
+KINDS = ("3d", "6d", "revolute")
+
+
+def spatial_pair(kind: str, seed: int = 0) -> fb.ClosedChain:
+    """Return two spatial arms on one moving body whose tips are joined, frames and axis in arbitrary poses."""
+    rng = np.random.default_rng(seed)
+    model = pin.Model()
+    trunk = add(model, 0, pin.JointModelSpherical(), at(0.1, 0.2, 0.3), "trunk", body(1))
+    tips = []
+    for k in range(2):
+        joint = trunk
+        for i, kin in enumerate((pin.JointModelRX, pin.JointModelRUBZ, pin.JointModelPY, pin.JointModelSpherical)):
+            joint = add(model, joint, kin(), at(*rng.uniform(-0.4, 0.4, 3), rng.normal(size=3)), f"arm{k}{i}", body(i))
+        tips.append(point(model, joint, f"tip{k}", at(*rng.uniform(-0.3, 0.3, 3), rng.normal(size=3))))
+    return fb.ClosedChain(model, (fb.Closure(tuple(tips), kind, rng.normal(size=3)),), ())
+
+
+def planar(kind: str) -> fb.ClosedChain:
+    return five_bar(kind=kind, base=TILTED)
+
+
+def states(chain: fb.ClosedChain, n: int = 9, size: float = 0.9) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(4)
+    q = loops_of(chain).tree.integrate(
+        np.repeat(pin.neutral(chain.model)[None], n, axis=0), rng.uniform(-size, size, (n, chain.nv))
+    )
+    return q, rng.normal(size=(n, chain.nv))
+
+
+def residual(loops: Loops, q: np.ndarray) -> np.ndarray:
+    return loops.residual(loops.pairs(loops.tree.poses(q)))
+
+
+def jacobian(loops: Loops, q: np.ndarray) -> np.ndarray:
+    poses = loops.tree.poses(q)
+    return loops.jacobian(poses, loops.pairs(poses))
+
+
+def central(function, h: float = 2e-3) -> np.ndarray:
+    """Return the derivative of a function of one number at zero, to h^6."""
+    d1, d2, d3 = (function(k * h) - function(-k * h) for k in (1, 2, 3))
+    return (45.0 * d1 - 9.0 * d2 + d3) / (60.0 * h)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("build", [spatial_pair, planar], ids=["spatial", "planar"])
+def test_jacobian_is_the_derivative_of_the_residual(build, kind):
+    chain = build(kind)
+    loops = loops_of(chain)
+    q, v = states(chain)
+    rate = central(lambda h: residual(loops, loops.tree.integrate(q, h * v)))
+    np.testing.assert_allclose(np.einsum("nmk,nk->nm", jacobian(loops, q), v), rate, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["3d", "revolute"])
+@pytest.mark.parametrize("build", [spatial_pair, planar], ids=["spatial", "planar"])
+def test_drift_is_the_rate_of_the_jacobian_times_the_velocity_anywhere(build, kind):
+    chain = build(kind)
+    loops = loops_of(chain)
+    q, v = states(chain)
+    poses = loops.tree.poses(q)
+    own = loops.drift(loops.pairs(poses), loops.tree.rates(q, v, poses))
+    rate = central(lambda h: np.einsum("nmk,nk->nm", jacobian(loops, loops.tree.integrate(q, h * v)), v))
+    np.testing.assert_allclose(own, rate, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("base", [AT_ORIGIN, TILTED], ids=["at origin", "tilted"])
+def test_drift_of_a_weld_is_exact_on_the_closed_loop(base):
+    chain = welded_four_bar(base=base)
+    loops = loops_of(chain)
+    q = fb.assemble(chain, [0.9])[None]
+    v = fb.complement(chain, q)[..., 0] * 1.7
+    poses = loops.tree.poses(q)
+    own = loops.drift(loops.pairs(poses), loops.tree.rates(q, v, poses))
+    rate = central(lambda h: np.einsum("nmk,nk->nm", jacobian(loops, loops.tree.integrate(q, h * v)), v))
+    np.testing.assert_allclose(own, rate, rtol=0.0, atol=1e-9)
+
+
+def pinocchio_jacobian(chain: fb.ClosedChain, k: int, q: np.ndarray, model_of: type) -> np.ndarray:
+    """Return Pinocchio's own Jacobian of closure k, in the axes of anchor 1."""
+    model, closure = chain.model, chain.closures[k]
+    first, second = (model.frames[model.getFrameId(f)] for f in closure.frames)
+    cm = model_of(model, first.parentJoint, first.placement, second.parentJoint, second.placement)
+    data, cdata = model.createData(), cm.createData()
+    pin.computeJointJacobians(model, data, q)
+    cm.calc(model, data, cdata)
+    return np.asarray(cm.jacobian(model, data, cdata))
+
+
+CLOSED = [
+    five_bar(),
+    five_bar(base=TILTED),
+    four_bar(base=TILTED, joint=pin.JointModelRUBZ),
+    slider_crank(base=TILTED),
+    rssr(base=TILTED),
+    double_four_bar(),
+    welded_four_bar(base=TILTED),
+]
+
+
+@pytest.mark.parametrize("chain", CLOSED, ids=lambda c: c.name)
+def test_jacobian_equals_pinocchio_on_closed_configurations(chain):
+    q = fb.assemble(chain, [0.9, 1.7][: chain.na])
+    J = jacobian(loops_of(chain), q[None])[0]
+    start = 0
+    for k, closure in enumerate(chain.closures):
+        weld = closure.kind is ClosureKind.WELD
+        theirs = pinocchio_jacobian(
+            chain, k, q, pin.FrameAnchorConstraintModel if weld else pin.PointAnchorConstraintModel
+        )
+        own = J[start : start + closure.kind.rows]
+        np.testing.assert_allclose(own, theirs, rtol=0.0, atol=1e-11)
+        start += closure.kind.rows
+
+
+@pytest.mark.parametrize(("chain", "q"), [rscr(), bennett(), rscr(base=TILTED)], ids=["rscr", "bennett", "tilted"])
+def test_revolute_closure_is_the_weld_of_pinocchio_without_the_turn_about_the_axis(chain, q):
+    J = jacobian(loops_of(chain), q[None])[0]
+    weld = pinocchio_jacobian(chain, 0, q, pin.FrameAnchorConstraintModel)
+    # On the closed loop relative angular velocity is what Pinocchio's rows 3..5 give, in the axes of frame 1.
+    n = np.asarray(chain.closures[0].axis)
+    np.testing.assert_allclose(J[:3], weld[:3], rtol=0.0, atol=1e-12)
+    across = weld[3:] - np.outer(n, n @ weld[3:])
+    assert np.linalg.matrix_rank(np.vstack([J[3:], across]), tol=1e-9) == np.linalg.matrix_rank(J[3:], tol=1e-9)
+    np.testing.assert_allclose(np.linalg.svd(J[3:])[1], np.linalg.svd(across)[1][:2], rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rows_are_named_in_their_order(kind):
+    closure = fb.Closure(("a", "b"), kind)
+    assert len(closure.row_names) == closure.kind.rows
+    assert closure.row_names[:3] == ("x", "y", "z")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_order_of_the_frames_does_not_change_the_mechanism(kind):
+    chain = planar(kind)
+    swapped = fb.ClosedChain(chain.model, (fb.Closure(chain.closures[0].frames[::-1], kind),), chain.actuated)
+    q = fb.assemble(five_bar(base=TILTED), [2.0, 1.0])
+    for c in (chain, swapped):
+        assert np.abs(fb.closure_residual(c, q)[:3]).max() < 1e-12
+    if kind == "3d":
+        np.testing.assert_allclose(fb.complement(chain, q), fb.complement(swapped, q), rtol=0.0, atol=1e-12)
+
+
+def test_planar_loops_keep_two_rows_of_three_five_and_three_of_six():
+    assert loops_of(five_bar(base=TILTED)).r == 2
+    assert loops_of(five_bar(base=TILTED, kind="revolute")).r == 2
+    assert loops_of(welded_four_bar(base=TILTED)).r == 3
+    assert loops_of(rssr(base=TILTED)).r == 3
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
+def test_rank_does_not_depend_on_the_size_of_the_mechanism(scale):
+    chain = five_bar(tuple(scale * a for a in (0.5, 1.2, 1.0, 0.6, 0.9)))
+    loops = loops_of(chain)
+    q = fb.assemble(chain, [2.0, 1.0], tolerance=1e-12)
+    assert loops.rank(jacobian(loops, q[None])[0]) == 2
+
+
+def test_hinge_closed_back_to_front_is_told_apart():
+    model = pin.Model()
+    arm = add(model, 0, pin.JointModelRX(), at(), "arm", body())
+    names = (point(model, 0, "ground", at()), point(model, arm, "moving", at()))
+    chain = fb.ClosedChain(model, (fb.Closure(names, "revolute"),), ())
+    loops = loops_of(chain)
+    q = np.array([[0.0], [np.pi]])
+    pairs = loops.pairs(loops.tree.poses(q))
+    assert np.abs(loops.residual(pairs)).max() < 1e-15
+    assert loops.opposed(pairs).tolist() == [False, True]
+
+
+def test_logarithm_holds_near_zero_and_near_half_a_turn():
+    rng = np.random.default_rng(2)
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    for angle in (0.0, 1e-12, 1e-6, 0.1, 2.0, np.pi - 1e-6):
+        np.testing.assert_allclose(log3(pin.exp3(angle * axis)), angle * axis, rtol=0.0, atol=1e-9 * max(angle, 1e-3))
+
+
+def test_closures_reject_what_they_cannot_be():
+    with pytest.raises(InvalidInputError, match="must be two frame names"):
+        fb.Closure(("a",))  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="must be two frame names"):
+        fb.Closure("ab")  # type: ignore[arg-type]
+    with pytest.raises(UnknownNameError, match=r"Unknown closure kind '4d'; known: 3d, 6d, revolute"):
+        fb.Closure(("a", "b"), "4d")  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="must not be zero"):
+        fb.Closure(("a", "b"), "revolute", (0.0, 0.0, 0.0))
+    with pytest.raises(InvalidInputError, match="must be finite"):
+        fb.Closure(("a", "b"), "revolute", (0.0, np.nan, 1.0))
+
+
+def test_closures_accept_the_words_of_a_sidecar_in_any_case_and_normalise_the_axis():
+    closure = fb.Closure(["a", "b"], " Revolute ", (0.0, 3.0, 4.0))  # type: ignore[arg-type]
+    assert closure.kind is ClosureKind.REVOLUTE
+    assert closure.frames == ("a", "b")
+    assert closure.name == "a~b"
+    np.testing.assert_allclose(closure.axis, [0.0, 0.6, 0.8], rtol=0.0, atol=1e-15)
+    assert not closure.axis.flags.writeable  # type: ignore[union-attr]

@@ -1,0 +1,178 @@
+"""The batched open-tree kernel is Pinocchio's kinematics, for every joint type."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from mechanisms import add, at, body, double_four_bar, five_bar, rscr, slider_crank
+
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.dynamics.bodies import Bodies, accelerations, body_rates, total_centre
+from fivebar_pin.mechanism.tree import Tree, motion_cross
+
+SLANTED = np.array([0.2, -0.6, 0.77]) / np.linalg.norm([0.2, -0.6, 0.77])
+
+
+def slanted_unbounded() -> object:
+    """Return an unbounded hinge about a slanted axis; only the URDF reader makes one."""
+    axis = " ".join(repr(float(x)) for x in SLANTED)
+    links = '<link name="base"/><link name="arm"/>'
+    hinge = f'<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="{axis}"/></joint>'
+    return pin.buildModelFromXML(f'<robot name="r">{links}{hinge}</robot>').joints[1]
+
+
+def composite() -> object:
+    """Return a hinge, a slide and a hinge in one joint."""
+    joint = pin.JointModelComposite(pin.JointModelRX(), pin.SE3.Identity())
+    joint.addJoint(pin.JointModelPY(), at(0.1, 0.2, 0.0))
+    joint.addJoint(pin.JointModelRZ(), at(0.0, 0.1, 0.3, (0.2, 0.0, 0.4)))
+    return joint
+
+
+JOINTS = {
+    "RX": pin.JointModelRX,
+    "RY": pin.JointModelRY,
+    "RZ": pin.JointModelRZ,
+    "revolute": lambda: pin.JointModelRevoluteUnaligned(SLANTED),
+    "RUBX": pin.JointModelRUBX,
+    "RUBY": pin.JointModelRUBY,
+    "RUBZ": pin.JointModelRUBZ,
+    "revolute unbounded": lambda: slanted_unbounded(),
+    "PX": pin.JointModelPX,
+    "PY": pin.JointModelPY,
+    "PZ": pin.JointModelPZ,
+    "prismatic": lambda: pin.JointModelPrismaticUnaligned(SLANTED),
+    "spherical": pin.JointModelSpherical,
+    "spherical ZYX": pin.JointModelSphericalZYX,
+    "translation": pin.JointModelTranslation,
+    "planar": pin.JointModelPlanar,
+    "free flyer": pin.JointModelFreeFlyer,
+    "helical": lambda: pin.JointModelHZ(0.3),
+    "helical unaligned": lambda: pin.JointModelHelicalUnaligned(SLANTED, 0.2),
+    "composite": lambda: composite(),
+    "universal": lambda: pin.JointModelUniversal(np.array([1.0, 0, 0]), np.array([0, 0.6, 0.8])),
+}
+SAMPLES = 25  # above the number up to which the kernel falls back on Pinocchio itself
+
+
+def tree_with(joint: object) -> pin.Model:
+    """Return a branched tree that has the joint at its root, in its middle and at a tip."""
+    model = pin.Model()
+    root = add(model, 0, joint(), at(0.1, -0.2, 0.3, (0.3, 0.2, -0.5)), "root", body(1))
+    middle = add(model, root, pin.JointModelRY(), at(0.4, 0.1, -0.1), "hinge", body(2))
+    branch = add(model, middle, joint(), at(0.2, 0.3, 0.2, (-0.4, 0.9, 0.1)), "branch", body(3))
+    add(model, root, pin.JointModelPX(), at(0.0, 0.3, 0.1, (0.9, 0.0, 0.3)), "slide", body(4))
+    add(model, branch, joint(), at(), "tip", body(5))
+    return model
+
+
+def random_state(model: pin.Model, n: int = SAMPLES, seed: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return q (n, nq), v, a (n, nv) far from neutral."""
+    rng = np.random.default_rng(seed)
+    q = [pin.integrate(model, pin.neutral(model), rng.uniform(-1.2, 1.2, model.nv)) for _ in range(n)]
+    return np.stack(q), rng.normal(size=(n, model.nv)), rng.normal(size=(n, model.nv))
+
+
+@pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
+@pytest.mark.parametrize("n", [1, SAMPLES], ids=["few", "batch"])
+def test_poses_and_motion_subspaces_equal_pinocchio(joint, n):
+    model = tree_with(joint)
+    data, tree = model.createData(), Tree(model)
+    q, _, _ = random_state(model, n)
+    poses = tree.poses(q)
+    for i in range(n):
+        S = pin.computeJointJacobians(model, data, q[i])
+        np.testing.assert_allclose(poses.S[i], S, rtol=0.0, atol=1e-13)
+        for j in range(model.njoints):
+            np.testing.assert_allclose(poses.R[j][i], data.oMi[j].rotation, rtol=0.0, atol=1e-13)
+            np.testing.assert_allclose(poses.p[j][i], data.oMi[j].translation, rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
+def test_velocities_and_bias_accelerations_equal_pinocchio(joint):
+    model = tree_with(joint)
+    data, tree = model.createData(), Tree(model)
+    q, v, _ = random_state(model)
+    rates = tree.rates(q, v, tree.poses(q))
+    for i in range(SAMPLES):
+        pin.forwardKinematics(model, data, q[i], v[i], np.zeros(model.nv))
+        for j in range(1, model.njoints):
+            V, A = data.oMi[j].act(data.v[j]).vector, data.oMi[j].act(data.a[j]).vector
+            np.testing.assert_allclose(rates.V[j][i], V, rtol=0.0, atol=1e-13 * max(1.0, np.abs(V).max()))
+            np.testing.assert_allclose(rates.A[j][i], A, rtol=0.0, atol=1e-13 * max(1.0, np.abs(A).max()))
+
+
+@pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
+def test_accelerations_equal_pinocchio(joint):
+    model = tree_with(joint)
+    data, tree = model.createData(), Tree(model)
+    q, v, a = random_state(model)
+    poses = tree.poses(q)
+    A = accelerations(tree, poses, tree.rates(q, v, poses), a)
+    for i in range(SAMPLES):
+        pin.forwardKinematics(model, data, q[i], v[i], a[i])
+        expected = np.stack([data.oMi[j].act(data.a[j]).vector for j in range(1, model.njoints)])
+        np.testing.assert_allclose(A[i], expected, rtol=0.0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
+def test_integrate_and_difference_equal_pinocchio(joint):
+    model = tree_with(joint)
+    tree = Tree(model)
+    q, v, _ = random_state(model)
+    moved = tree.integrate(q, v)
+    expected = np.stack([pin.integrate(model, x, d) for x, d in zip(q, v, strict=True)])
+    np.testing.assert_allclose(moved, expected, rtol=0.0, atol=1e-13)
+    back = np.stack([pin.difference(model, x, y) for x, y in zip(q, expected, strict=True)])
+    np.testing.assert_allclose(tree.difference(q, moved), back, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
+def test_momentum_and_its_rate_equal_pinocchio(joint):
+    model = tree_with(joint)
+    model.gravity.linear = np.zeros(3)
+    chain = ClosedChain(model, (), ())
+    data, tree, bodies = model.createData(), Tree(chain.model), Bodies.of(chain)
+    q, v, a = random_state(model)
+    poses = tree.poses(q)
+    moving = body_rates(tree, bodies, poses, tree.rates(q, v, poses), a)
+    centre = total_centre(bodies, poses)
+    for i in range(SAMPLES):
+        pin.computeCentroidalMomentumTimeVariation(model, data, q[i], v[i], a[i])
+        np.testing.assert_allclose(centre[i], data.com[0], rtol=0.0, atol=1e-13)
+        for own, theirs in ((moving.momentum, data.hg), (moving.rate, data.dhg)):
+            total = own[i].sum(axis=0)
+            np.testing.assert_allclose(total[:3], theirs.linear, rtol=0.0, atol=2e-13 * np.abs(total).max())
+            about_com = total[3:] - np.cross(data.com[0], total[:3])
+            np.testing.assert_allclose(about_com, theirs.angular, rtol=0.0, atol=1e-12 * np.abs(total).max())
+
+
+def test_spatial_cross_product_is_the_action_of_motions():
+    rng = np.random.default_rng(0)
+    V, W = rng.normal(size=(2, 6))
+    np.testing.assert_allclose(motion_cross(V, W), (pin.Motion(V) ^ pin.Motion(W)).vector, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("kind", [pin.JointModelRZ, pin.JointModelRUBZ, pin.JointModelPX])
+def test_single_coordinates_are_read_back_as_written(kind):
+    model = tree_with(kind)
+    tree = Tree(model)
+    q, _, _ = random_state(model)
+    values = np.linspace(-3.0, 3.0, SAMPLES)
+    k = int(model.idx_vs[model.getJointId("branch")])
+    root = np.array(tree.poses(q).R[1])
+    tree.set_coordinate(q, k, values)
+    np.testing.assert_allclose(tree.coordinate(q, k), values, rtol=0.0, atol=1e-15)
+    np.testing.assert_array_equal(tree.poses(q).R[1], root)
+    assert tree.is_angle(k) is (kind is not pin.JointModelPX)
+
+
+@pytest.mark.parametrize("chain", [five_bar(), slider_crank(), double_four_bar(), rscr()[0]], ids=lambda c: c.name)
+def test_support_lists_the_joints_that_move_a_body(chain):
+    tree, model = Tree(chain.model), chain.model
+    for j in range(1, model.njoints):
+        moving = set()
+        for i in list(model.supports[j])[1:]:
+            moving |= set(range(model.idx_vs[i], model.idx_vs[i] + model.joints[i].nv))
+        assert set(np.flatnonzero(tree.support[j])) == moving
