@@ -176,6 +176,7 @@ def specimens() -> tuple[object, ...]:
         paper.conditions(linkage),
         paper.audit_table_1(),
         paper.errata(),
+        loads.reactions,
     )
     return (
         *(chain, motion, trajectory, loads, free, energy, linkage, five, solution, problem, design, none, front, score),
