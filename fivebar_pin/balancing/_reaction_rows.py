@@ -12,7 +12,8 @@ from fivebar_pin._arrays import Array, skew
 from fivebar_pin.balancing._state import gravity_of, state_of, torque_offset, tree_torque
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import closure as closure_rows
-from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.trajectory import Trajectory
 
 
@@ -46,10 +47,8 @@ def reactions(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array, Array]
 
 def _multiplier_map(loops: Loops, J: Array) -> Array:
     """Return X (n, m, nv): closure forces of least norm = X @ unbalanced torque."""
-    U, s, Vt = np.linalg.svd(J * loops.row_scale[:, None] * loops.column_scale, full_matrices=False)
-    rank = int(np.min(np.sum(s > RANK_TOLERANCE * np.maximum(s[:, :1], 1e-300), axis=1)))
-    inverse = np.where(np.arange(s.shape[1]) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)
-    return np.asarray(np.matmul(U * inverse[:, None, :], Vt) * loops.row_scale[:, None] * loops.column_scale)
+    decomposed = Decomposed.of(loops.scaled(J))
+    return loops.scaled(decomposed.carrier(decomposed.rank))
 
 
 def _at(wrench: Array, point: Array) -> Array:

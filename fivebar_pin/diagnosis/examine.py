@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, block_svd, checked, frozen, integer
+from fivebar_pin._arrays import Array, checked, frozen, integer
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin.dynamics.reactions import reactions
-from fivebar_pin.kinematics.branch import SINGULAR
 from fivebar_pin.mechanism import mobility
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.mobility import Site
 from fivebar_pin.mechanism.newton import closed_enough, residual_of
+from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "diagnose"]
@@ -48,7 +48,6 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     integer("seed", seed)
     loops = loops_of(chain)
     findings: list[Finding] = []
-    integer("seed", seed)
     start, gap = _start(chain, q, seed, findings)
     here = mobility.site_at(loops, start)
     generic = mobility.generic_site(chain, here, seed, _REACHED) if _is_closed(loops, start) else here
@@ -74,7 +73,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         generic_rank=generic.rank,
         mobility=chain.nv - here.rank,
         generic_mobility=chain.nv - generic.rank,
-        singular_values=frozen(loops.singular_values(here.J)),
+        singular_values=frozen(singular_values(loops.scaled(here.J))),
         redundant=redundant,
         actuated=chain.actuated,
         actuation=actuation,
@@ -155,9 +154,9 @@ def _actuation(chain: ClosedChain, site: Site) -> tuple[Actuation, tuple[str, ..
     excess = chain.na - (chain.nv - site.rank - free)
     undetermined: tuple[str, ...] = ()
     if free:
-        scaled = (loops.row_scale[:, None] * Jp * loops.column_scale)[:, loops.passive]
-        null = block_svd(scaled)[2][loops.passive.size - free :] if loops.m else np.eye(free)
-        undetermined = _owners(chain, loops.passive[np.abs(null).max(axis=0) > _STILL])
+        scaled = loops.scaled(Jp)[:, loops.passive]
+        loose = Decomposed.of(scaled[None]).tangent(loops.passive.size - free)[0]
+        undetermined = _owners(chain, loops.passive[np.abs(loose).max(axis=1) > _STILL])
     if not chain.na:
         return Actuation.NONE, undetermined, excess
     if free:
@@ -170,11 +169,9 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
         return 0.0
     if sigma == 0.0:
         return float("inf")
-    scaled = loops.row_scale[:, None] * J * loops.column_scale
-    U, s, Vt = block_svd(scaled[:, loops.passive])
-    k = s.size
-    N = Vt[:k].T @ ((U[:, :k].T @ scaled[:, loops.actuated]) / s[:, None])
-    return float(np.abs(N).max())
+    scaled = loops.scaled(J)[None]
+    passive = Decomposed.of(scaled[:, :, loops.passive])
+    return float(np.abs(passive.solve(scaled[:, :, loops.actuated], loops.passive.size)).max())
 
 
 def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, Immutable, block_svd, cross, finite, frozen
+from fivebar_pin._arrays import Array, Immutable, cross, finite, frozen
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.closures import closure as rows
 from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_wrenches
 from fivebar_pin.dynamics.elastic import body_wrenches
-from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
@@ -122,14 +123,10 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
         return _ClosureForces(np.zeros((n, 0)), none, none[:, None], none[..., :3], np.zeros((n, 0, 3, 3)), mismatch)
     pairs = loops.pairs(poses)
     J = loops.jacobian(poses, pairs)
-    scaled = loops.row_scale[:, None] * J * loops.column_scale
-    U, s, Vt = [x[None] for x in block_svd(scaled[0])] if n == 1 else np.linalg.svd(scaled, full_matrices=True)
-    rank = int(np.min(np.sum(s > RANK_TOLERANCE * np.maximum(s[:, :1], 1e-300), axis=1)))
-    k = s.shape[1]
-    inverse = np.where(np.arange(k) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)
-    loaded = np.matmul(Vt[:, :k], (unbalanced * loops.column_scale)[..., None])[..., 0] * inverse
-    multipliers = np.matmul(U[:, :, :k], loaded[..., None])[..., 0] * loops.row_scale
-    null = np.swapaxes(U[:, :, rank:], 1, 2) * loops.row_scale * loops.length  # (n, k, m)
+    decomposed = Decomposed.of(loops.scaled(J))
+    rank = decomposed.rank
+    multipliers = decomposed.carry(unbalanced * loops.column_scale, rank) * loops.row_scale
+    null = decomposed.left_null(rank) * loops.row_scale * loops.length  # (n, k, m)
     wrench, free = [], []
     for anchored, pair in zip(loops.anchored, pairs, strict=True):
         T = rows.selector(anchored.closure, pair)

@@ -1,4 +1,4 @@
-"""The closures of a chain over a batch of samples, and the one place where rank is decided."""
+"""The closures of a chain over a batch of samples: residual, Jacobian, drift, and their independent groups."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, block_svd
+from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import Closure
 from fivebar_pin.closures import closure as rows
 from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.errors import AssemblyError, InvalidInputError
+from fivebar_pin.mechanism.passive import Group, PassiveMap, passive_map
 from fivebar_pin.mechanism.per_chain import once_per_chain
+from fivebar_pin.mechanism.rank import ranks_of, singular_values
 from fivebar_pin.mechanism.tree import Poses, Rates, Tree
 
-__all__ = ["RANK_TOLERANCE", "Loops", "PassiveMap", "inverse", "loops_of", "open_message", "same_side"]
+__all__ = ["Loops", "loops_of", "open_message"]
 
 
-RANK_TOLERANCE = 1e-9  # of the largest singular value of the scaled Jacobian [-]
-_WHOLE = 4000  # entries of a Jacobian from which on it is decomposed block by block
+_Index = npt.NDArray[np.intp] | slice
+
 _GENERIC_SAMPLES = 12
 
 
@@ -38,61 +40,6 @@ class _Anchored:
     sign: Array  # (nv,): +1 moves only body 2, -1 only body 1, 0 both or neither
     moved: npt.NDArray[np.intp]  # columns with a sign
     rows: slice
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Group:
-    """Closures that share passive joints; groups are independent of each other given the actuated coordinates."""
-
-    members: tuple[int, ...]  # closures
-    rows: npt.NDArray[np.intp]  # of J
-    columns: npt.NDArray[np.intp]  # velocity coordinates that move some of the rows
-    passive: npt.NDArray[np.intp]  # positions in `Loops.passive`
-    passive_columns: npt.NDArray[np.intp]  # the same, positions in `columns`
-    actuated: npt.NDArray[np.intp]  # positions in `Loops.actuated`
-    actuated_columns: npt.NDArray[np.intp]
-    reduce: Array  # independent row combinations (r, rows)
-    scale: Array  # of the passive columns
-
-    @property
-    def is_square(self) -> bool:
-        return bool(self.reduce.shape[0] == self.passive.size)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PassiveMap:
-    """What takes the actuated coordinates to the passive ones at a batch of configurations.
-
-    Attributes:
-        groups: the independent groups of closures.
-        X: per group, pseudo-inverse of the passive columns of its reduced rows (n, np_g, r_g); nan where singular.
-        sigma: lower estimate of their smallest singular value, scaled [-] (n,).
-        sign: sign of their determinant, per group; one where they are not square (n, groups).
-        tall: those that are not square, scaled (n, r_g, np_g): see `same_side`.
-        size: number of passive and actuated coordinates.
-    """
-
-    groups: list[_Group]
-    X: list[Array]
-    sigma: Array
-    sign: Array
-    tall: list[Array]
-    size: tuple[int, int]
-
-    def solve(self, rows: Array) -> Array:
-        """Return the passive tangent that changes the closure rows (n, m) by this much, (n, np)."""
-        out = np.zeros((rows.shape[0], self.size[0]))
-        for g, X in zip(self.groups, self.X, strict=True):
-            out[:, g.passive] = np.matmul(X, (rows[:, g.rows] @ g.reduce.T)[..., None])[..., 0]
-        return out
-
-    def complement(self, blocks: list[Array]) -> Array:
-        """Return the passive rows of the complement (n, np, na) from the Jacobian's blocks."""
-        out = np.zeros((self.sigma.size, *self.size))
-        for g, X, J in zip(self.groups, self.X, blocks, strict=True):
-            if g.actuated.size:
-                out[:, g.passive[:, None], g.actuated] = -np.matmul(X, np.matmul(g.reduce, J[:, :, g.actuated_columns]))
-        return out
 
 
 class Loops:
@@ -151,7 +98,7 @@ class Loops:
         return len(self._groups)
 
     @property
-    def independent(self) -> list[_Group]:
+    def independent(self) -> list[Group]:
         """The groups of closures that share no passive joint."""
         return self._groups
 
@@ -227,36 +174,19 @@ class Loops:
         return np.asarray(np.any(flags, axis=0))
 
     def passive_map(self, blocks: list[Array]) -> PassiveMap:
-        """Invert the passive columns of the Jacobian's blocks. Singular samples get sigma = 0 and X = nan."""
-        n = blocks[0].shape[0] if blocks else 1
-        X, tall, sigma, sign = [], [], np.full(n, 1.0), np.ones((n, len(self._groups)))
-        for k, (g, J) in enumerate(zip(self._groups, blocks, strict=True)):
-            Jp = np.matmul(g.reduce, J[:, :, g.passive_columns]) * g.scale
-            if g.is_square:
-                inverted, determinant = inverse(Jp)
-                sign[:, k] = np.sign(determinant)
-                with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                    smallest = 1.0 / np.sqrt(np.einsum("nij,nij->n", inverted, inverted))
-            else:
-                inverted, smallest = _pseudo_inverse(Jp)
-                tall.append(Jp)
-            X.append(g.scale[:, None] * inverted)
-            if g.passive.size:
-                smallest = np.where(np.isfinite(smallest), smallest, 0.0)
-                sigma = smallest if len(self._groups) == 1 else np.minimum(sigma, smallest)
-        return PassiveMap(self._groups, X, sigma, sign, tall, (self.passive.size, self.actuated.size))
+        """Invert the passive columns of the Jacobian's blocks, see `passive.passive_map`."""
+        return passive_map(self._groups, blocks, (self.passive.size, self.actuated.size))
 
-    def rank(self, J: Array, *, tolerance: float = RANK_TOLERANCE) -> int:
-        """Return the rank of one closure Jacobian (m, nv), scaled so that lengths and units do not matter."""
-        s = self.singular_values(J)
-        return int(np.sum(s > tolerance * max(1.0, s[0]))) if s.size else 0
+    def scaled(self, J: Array, rows: _Index = slice(None), columns: _Index = slice(None)) -> Array:
+        """Return closure Jacobians (..., m, nv), or these rows and columns of them, in one unit: lengths do not matter.
 
-    def singular_values(self, J: Array) -> Array:
-        """Return the singular values of the scaled closure Jacobian, descending."""
-        if 0 in J.shape:
-            return np.zeros(0)
-        scaled = self.row_scale[:, None] * J * self.column_scale
-        return np.asarray(np.linalg.svd(scaled, compute_uv=False) if J.size < _WHOLE else block_svd(scaled)[1])
+        Velocities of angles stay as they are, those of slides and the rates of gaps are in the chain's length.
+        """
+        return np.asarray(self.row_scale[rows, None] * J * self.column_scale[columns])
+
+    def rank(self, J: Array) -> int:
+        """Return the rank of one closure Jacobian (m, nv)."""
+        return int(ranks_of(singular_values(self.scaled(J))))
 
     def worst(self, residual: Array) -> tuple[str, float]:
         """Return the closure that one residual (m,) leaves open the most, and by how much."""
@@ -290,13 +220,13 @@ class Loops:
             groups = [*apart, (columns, members)]
         return sorted(tuple(sorted(members)) for _, members in groups)
 
-    def _group(self, members: tuple[int, ...]) -> _Group:
+    def _group(self, members: tuple[int, ...]) -> Group:
         closures = [self.anchored[k] for k in members]
         rows_ = np.concatenate([np.arange(c.rows.start, c.rows.stop) for c in closures])
         columns = np.unique(np.concatenate([c.moved for c in closures]))
         passive = np.flatnonzero(np.isin(self.passive, columns))
         actuated = np.flatnonzero(np.isin(self.actuated, columns))
-        return _Group(
+        return Group(
             members=members,
             rows=rows_,
             columns=columns,
@@ -320,9 +250,9 @@ class Loops:
             J[:, start : start + m, np.searchsorted(columns, c.moved)] = _rows(c, poses, pairs)
             start += m
         scale = self.row_scale[rows_]
-        wide = np.concatenate(list(J * scale[:, None] * self.column_scale[columns]), axis=1)
+        wide = np.concatenate(list(self.scaled(J, rows_, columns)), axis=1)
         U, s, _ = np.linalg.svd(wide, full_matrices=False)
-        r = int(np.sum(s > RANK_TOLERANCE * max(s[0], 1e-300)))
+        r = int(ranks_of(s))
         return np.diag(scale) if r == rows_.size else np.asarray(U[:, :r].T * scale)
 
     @cached_property
@@ -361,53 +291,3 @@ def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
         closure=name,
         residual=size,
     )
-
-
-def same_side(before: list[Array], after: list[Array]) -> npt.NDArray[np.bool_]:
-    """Tell whether no singularity lies between tall matrices (..., r, k): square ones show it in their determinant.
-
-    A column combination that passes through zero turns round, which makes det(A^T B) negative.
-    """
-    sides = [np.linalg.det(np.matmul(np.swapaxes(A, -1, -2), B)) > 0.0 for A, B in zip(before, after, strict=True)]
-    return np.asarray(np.all(sides, axis=0))
-
-
-def _pseudo_inverse(M: Array) -> tuple[Array, Array]:
-    """Return the pseudo-inverses of a batch of tall matrices and their smallest singular values."""
-    U, s, Vt = np.linalg.svd(M, full_matrices=False)
-    smallest = s[:, -1] if M.shape[1] >= M.shape[2] > 0 else np.zeros(M.shape[0])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        X = np.matmul(np.swapaxes(Vt, 1, 2) / s[:, None, :], np.swapaxes(U, 1, 2))
-    return X, smallest
-
-
-def inverse(M: Array) -> tuple[Array, Array]:
-    """Invert a batch of square matrices; singular ones become nan. Also return the determinants."""
-    if M.shape[-1] == 2:
-        return _inverse_of_two(M)
-    return _inverse(M), np.asarray(np.linalg.det(M))
-
-
-def _inverse_of_two(M: Array) -> tuple[Array, Array]:
-    """The usual case of one planar loop in closed form: by the cofactors, far cheaper than a factorisation."""
-    det = M[:, 0, 0] * M[:, 1, 1] - M[:, 0, 1] * M[:, 1, 0]
-    with np.errstate(divide="ignore"):
-        scale = np.where(det == 0.0, np.nan, 1.0 / det)
-    X = np.empty_like(M)
-    X[:, 0, 0], X[:, 1, 1] = M[:, 1, 1] * scale, M[:, 0, 0] * scale
-    X[:, 0, 1], X[:, 1, 0] = -M[:, 0, 1] * scale, -M[:, 1, 0] * scale
-    return X, det
-
-
-def _inverse(M: Array) -> Array:
-    """Invert a batch of square matrices by factorisation; singular ones become nan."""
-    try:
-        return np.asarray(np.linalg.inv(M))
-    except np.linalg.LinAlgError:
-        out = np.full_like(M, np.nan)
-        for i, Mi in enumerate(M):
-            try:
-                out[i] = np.linalg.inv(Mi)
-            except np.linalg.LinAlgError:
-                continue
-        return out

@@ -21,8 +21,9 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.errors import SingularityError
-from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of, open_message
+from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.per_chain import once_per_chain
+from fivebar_pin.mechanism.rank import SINGULAR, ranks_of
 from fivebar_pin.mechanism.tree import Poses
 
 __all__ = ["ROUND_OFF", "Chart", "Manifold", "Point", "manifold_of"]
@@ -104,7 +105,7 @@ class Manifold:
         """
         if not self.loops.r or not point.s.size:
             return self.loops.r
-        ranks = np.sum(point.s > RANK_TOLERANCE * np.maximum(1.0, point.s[:, :1]), axis=1)
+        ranks = ranks_of(point.s)
         if self._rank is None and int(ranks.min()) == self.loops.r:
             self._rank = self.loops.r
         if self._rank is None:
@@ -185,7 +186,7 @@ class Manifold:
 
     def _least(self, point: Point) -> Array:
         """Return the step of least length towards closure, scaled (nv,); directions of tiny slope are left out."""
-        keep = point.s[0] > 1e-7
+        keep = point.s[0] > SINGULAR
         along = np.where(keep, point.U[0, :, : keep.size].T @ point.reduced[0], 0.0) / np.where(keep, point.s[0], 1.0)
         step = -(point.Vt[0, : keep.size].T @ along)
         return np.asarray(step * min(1.0, 0.5 / max(float(np.abs(step).max(initial=0.0)), 1e-300)))
@@ -194,7 +195,7 @@ class Manifold:
         """Return the largest rank met at closed configurations around q (nq,)."""
         rng = np.random.default_rng(11)
         here = self.at(q[None])
-        tangent = here.Vt[0, int(np.sum(here.s[0] > RANK_TOLERANCE)) :]
+        tangent = here.Vt[0, int(ranks_of(here.s[0])) :]
         best = 0
         for _ in range(_PROBES):
             step = rng.normal(size=tangent.shape[0]) @ tangent
@@ -203,7 +204,7 @@ class Manifold:
             for _ in range(60):
                 near = self.at(self.loops.tree.integrate(near.q, (self._least(near) * self.scale)[None]))
             if np.abs(near.reduced).max(initial=0.0) < 1e-12:
-                best = max(best, int(np.sum(near.s[0] > 1e-7)))
+                best = max(best, int(np.sum(near.s[0] > SINGULAR)))
         return best
 
 

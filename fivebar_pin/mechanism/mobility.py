@@ -1,6 +1,6 @@
 """Closed configurations of a chain whichever joints are driven, and what its closures do there.
 
-Every decision about rank is made by `Loops.rank`; here its consequences are given names.
+Every decision about rank is made in `mechanism.rank`; here its consequences are given names.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from fivebar_pin._arrays import Array, block_svd
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.newton import closed_enough, residual_of, search
+from fivebar_pin.mechanism.rank import Decomposed, ranks_of, singular_values, truncated_inverse
 
 __all__ = [
     "Site",
@@ -32,7 +33,6 @@ __all__ = [
 ]
 
 
-_TRUNCATE = 1e-6  # singular values below this part of the largest are left out of a Newton step [-]
 _STARTS = 48  # random starts when no configuration is given
 _WALKERS, _STRIDES = 8, 2  # samples and steps of the walk that finds generic configurations
 _ENTRIES = 400_000  # numbers in the Jacobians of all of them at a time
@@ -65,8 +65,7 @@ def site_at(loops: Loops, q: Array) -> Site:
     poses = loops.tree.poses(q[None])
     J = loops.jacobian(poses, loops.pairs(poses))[0]
     rank = loops.rank(J)
-    _, _, Vt = block_svd(loops.row_scale[:, None] * J * loops.column_scale)
-    return Site(q, J, rank, Vt[rank:].T)
+    return Site(q, J, rank, Decomposed.of(loops.scaled(J)[None]).tangent(rank)[0])
 
 
 def gap(loops: Loops, q: Array) -> Array:
@@ -93,8 +92,7 @@ def close(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]
         residual = loops.residual(pairs) * loops.row_scale
         step = np.zeros((q.shape[0], loops.tree.nv))
         for g, block in zip(loops.independent, loops.blocks(poses, pairs), strict=True):
-            scaled = loops.row_scale[g.rows, None] * block * loops.column_scale[g.columns]
-            inverse = np.linalg.pinv(scaled, rcond=_TRUNCATE)
+            inverse = truncated_inverse(loops.scaled(block, g.rows, g.columns))
             step[:, g.columns] = -np.matmul(inverse, residual[:, g.rows, None])[..., 0]
         step[good] = 0.0
         q = loops.tree.integrate(q, np.clip(step, -0.5, 0.5) * loops.column_scale)
@@ -156,7 +154,7 @@ def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) ->
 
 def _score(loops: Loops, site: Site) -> tuple[int, int, float]:
     """Return the rank, the rank with the actuated joints held, and the smallest singular value that counts."""
-    s = loops.singular_values(site.J)
+    s = singular_values(loops.scaled(site.J))
     return site.rank, loops.rank(held(site.J, loops.actuated)), float(s[site.rank - 1]) if site.rank else 0.0
 
 
@@ -176,8 +174,7 @@ def redundant_combinations(loops: Loops, site: Site) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((0, 0))
     kept = loops.reduce / loops.row_scale  # orthonormal rows
     always = _complement_rows(kept, loops.m - loops.r)
-    U, _, _ = block_svd(loops.row_scale[:, None] * site.J * loops.column_scale)
-    null = U[:, site.rank :].T
+    null = Decomposed.of(loops.scaled(site.J)[None]).left_null(site.rank)[0]
     extra = null.shape[0] - always.shape[0]
     outside = null - null @ always.T @ always
     here = block_svd(outside)[2][:extra] if extra > 0 else np.zeros((0, null.shape[1]))
@@ -213,8 +210,8 @@ def passive_sigma(loops: Loops, J: Array, actuated: npt.NDArray[np.intp]) -> flo
     passive = np.setdiff1d(np.arange(loops.tree.nv), actuated)
     if not passive.size:
         return 1.0
-    Jp = held(J, actuated)
-    return float(loops.singular_values(Jp)[passive.size - 1]) if loops.rank(Jp) == passive.size else 0.0
+    s = singular_values(loops.scaled(held(J, actuated)))
+    return float(s[passive.size - 1]) if ranks_of(s) == passive.size else 0.0
 
 
 def determining_sets(chain: ClosedChain, site: Site, most: int) -> list[tuple[tuple[str, ...], float]]:

@@ -12,6 +12,7 @@ from fivebar_pin._arrays import Array, checked, numeric
 from fivebar_pin.dynamics.equations import Mode, System, Wrench
 from fivebar_pin.errors import SingularityError, SolverError
 from fivebar_pin.mechanism.manifold import Chart, Point
+from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = [
     "ChartMotion",
@@ -30,7 +31,6 @@ __all__ = [
 _TURNED = 0.7  # cosine between chart and tangent space at which the chart is changed
 _FAR = 1.5  # distance from its middle at which a chart is changed [rad, or chain lengths]
 _SMOOTH = 0.02  # mismatch of a step with the velocities and accelerations at its ends, relative
-_LOST = 1e-7  # scaled singular value below which round-off decides on the direction of motion [-]
 _NO_END = 1e-5  # scaled singular value that a step may not end below: round-off would show in the velocity [-]
 _NEARLY_SINGULAR = 1e-3  # scaled singular value at which a failure is put down to a bifurcation [-]
 
@@ -103,7 +103,7 @@ class ChartMotion:
         if not np.all(np.isfinite(y)):
             return None
         point = manifold.solve(self.chart, y[:f], self.predict(t) if guess is None else guess, self.rank)
-        if point is None or sigma_of(point, self.rank) < _LOST:
+        if point is None or sigma_of(point, self.rank) < SINGULAR:
             return None
         T = point.Vt[0, self.rank :].T  # tangent space here (nv, f)
         try:

@@ -88,7 +88,6 @@ def simulate(
     integer("max_steps", max_steps, least=1)
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
-    integer("max_steps", max_steps, least=1)
     system = System.of(chain, tuple(springs))
     for frame in external or {}:
         check_frame(chain, frame)
