@@ -17,8 +17,8 @@ from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing._walk import HELD, Ground, Walk, ground
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
+from fivebar_pin.mechanism.closing import Limits, polish, residual_of, search
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.newton import Limits, polish, residual_of, search
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.tree import Poses
 

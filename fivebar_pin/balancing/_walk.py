@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable
+from fivebar_pin.mechanism.closing import Limits
 from fivebar_pin.mechanism.loops import Loops
-from fivebar_pin.mechanism.newton import Limits
 from fivebar_pin.mechanism.rank import inverse
 
 HELD = 1e-6  # scaled smallest singular value of the passive columns where the motors still hold the mechanism [-]

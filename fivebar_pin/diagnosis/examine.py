@@ -14,9 +14,9 @@ from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin.dynamics.reactions import reactions
 from fivebar_pin.mechanism import mobility
+from fivebar_pin.mechanism.closing import closed_enough, residual_of
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.mobility import Site
-from fivebar_pin.mechanism.newton import closed_enough, residual_of
 from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
 

@@ -11,8 +11,8 @@ from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
 from fivebar_pin.kinematics.branch import follow, node_at
+from fivebar_pin.mechanism.closing import closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
-from fivebar_pin.mechanism.newton import closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = ["CLOSED", "assemble", "checked_search", "closed_from_starts", "closure_residual"]

@@ -8,8 +8,8 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import AssemblyError, BranchError, SingularityError
+from fivebar_pin.mechanism.closing import Closed, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.loops import Loops, open_message
-from fivebar_pin.mechanism.newton import Closed, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.rank import SINGULAR, same_side
 
 __all__ = ["LONGEST", "follow", "node_at", "track"]

@@ -15,8 +15,8 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, block_svd
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.mechanism.closing import closed_enough, residual_of, search
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.newton import closed_enough, residual_of, search
 from fivebar_pin.mechanism.rank import Decomposed, ranks_of, singular_values, truncated_inverse
 
 __all__ = [
