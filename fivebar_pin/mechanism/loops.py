@@ -140,8 +140,12 @@ class Loops:
 
     def jacobian(self, poses: Poses, pairs: list[FramePair]) -> Array:
         """Return the closure Jacobian J (n, m, nv): residual rate = J v."""
-        J = np.zeros((poses.S.shape[0], self.m, self.tree.nv))
-        for g, block in zip(self._groups, self.blocks(poses, pairs), strict=True):
+        return self.joined(self.blocks(poses, pairs), poses.S.shape[0])
+
+    def joined(self, blocks: list[Array], n: int) -> Array:
+        """Return the closure Jacobian (n, m, nv) from its blocks."""
+        J = np.zeros((n, self.m, self.tree.nv))
+        for g, block in zip(self._groups, blocks, strict=True):
             J[:, g.rows[:, None], g.columns] = block
         return J
 
