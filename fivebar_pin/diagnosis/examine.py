@@ -169,9 +169,9 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
         return 0.0
     if sigma == 0.0:
         return float("inf")
-    scaled = loops.scaled(J)[None]
-    passive = Decomposed.of(scaled[:, :, loops.passive])
-    return float(np.abs(passive.solve(scaled[:, :, loops.actuated], loops.passive.size)).max())
+    scaled = loops.scaled(J)
+    passive = Decomposed.of(scaled[None][:, :, loops.passive])
+    return float(np.abs(passive.solve(scaled[:, loops.actuated].T, loops.passive.size)).max())
 
 
 def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import Bodies, body_rates, gravity_wrenches
-from fivebar_pin.dynamics.equations import System, checked_wrench
+from fivebar_pin.dynamics.equations import EquationsOfMotion, checked_wrench
 from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
@@ -87,7 +87,7 @@ def energy_balance(
     Returns:
         Energies, their rate, and the powers supplied and dissipated.
     """
-    system, n, v = System.of(chain, tuple(springs)), len(trajectory), trajectory.v
+    system, n, v = EquationsOfMotion.of(chain, tuple(springs)), len(trajectory), trajectory.v
     given = np.zeros(chain.na) if torque is None else numeric("torque", torque)
     tau = checked(
         "torque", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na)

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import System, checked_wrench
+from fivebar_pin.dynamics.equations import EquationsOfMotion, checked_wrench
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.mechanism.manifold import Point
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["constant_torque", "forward_dynamics", "require_consistent"]
@@ -56,7 +56,7 @@ def forward_dynamics(
         InvalidInputError: wrong shapes; q not closed or v not consistent with the closures; a motion without inertia.
         SingularityError: q is a bifurcation, where the motion is not determined.
     """
-    system = System.of(chain, tuple(springs))
+    system = EquationsOfMotion.of(chain, tuple(springs))
     Q = numeric("q", q)
     single = Q.ndim == 1
     Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
@@ -80,7 +80,7 @@ def constant_torque(chain: ClosedChain, tau: npt.ArrayLike | None) -> Array:
     return given.reshape(1) if given.ndim == 0 and chain.na == 1 else given
 
 
-def require_consistent(system: System, point: Point, v: Array) -> None:
+def require_consistent(system: EquationsOfMotion, point: Configurations, v: Array) -> None:
     loops, scale = system.manifold.loops, system.manifold.scale
     if not loops.m:
         return
@@ -95,7 +95,7 @@ def require_consistent(system: System, point: Point, v: Array) -> None:
             "Use assemble, or simulate(initial='project').",
         )
     u = v / scale
-    rate = np.abs(point.s * np.einsum("nrk,nk->nr", point.Vt[:, : point.s.shape[1]], u)).max(axis=1)
+    rate = point.independent.rate(u)
     bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), 1e-300)
     worst = int(np.argmax(rate - bound))
     if rate[worst] > bound[worst]:

@@ -117,14 +117,22 @@ class Decomposed:
         """Return the smallest singular value that counts (n,); one where nothing is closed."""
         return np.asarray(self.s[:, rank - 1]) if rank else np.ones(self.s.shape[0])
 
+    def rate(self, velocity: Array) -> Array:
+        """Return the largest rate of the closures, along their own axes, at velocities (n, nv), scaled -> (n,)."""
+        along = np.einsum("nrk,nk->nr", self.Vt[:, : self.s.shape[1]], velocity)
+        return np.asarray(np.abs(self.s * along).max(axis=1, initial=0.0))
+
     def solve(self, rows: Array, rank: int) -> Array:
-        """Return the velocities of least length (n, nv, c) with these rates of the closures (n, m, c), all scaled."""
-        return np.asarray(np.matmul(np.swapaxes(self.Vt[:, :rank], 1, 2), self.components(rows, rank)))
+        """Return the velocity of least length (n, nv) with these rates of the closures (n, m), both scaled."""
+        return np.asarray(np.einsum("nrk,nr->nk", self.Vt[:, :rank], self.components(rows, rank)))
 
     def components(self, rows: Array, rank: int) -> Array:
-        """Return the components (n, rank, c) of the same along the first rows of Vt; nan where J lacks this rank."""
+        """Return the components (n, rank) of the same along the first rows of Vt; not finite where J lacks this rank.
+
+        The decomposition of one configuration serves many rates.
+        """
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            return np.asarray(np.matmul(np.swapaxes(self.U[:, :, :rank], 1, 2), rows) / self.s[:, :rank, None])
+            return np.asarray(np.einsum("nir,ni->nr", self.U[:, :, :rank], rows) / self.s[:, :rank])
 
     def carry(self, torque: Array, rank: int) -> Array:
         """Return the closure forces of least norm (n, m) that carry torques (n, nv), both scaled: J^T f = torque."""

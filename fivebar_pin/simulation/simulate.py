@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite, integer, number
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import System, Wrench, check_frame
+from fivebar_pin.dynamics.equations import EquationsOfMotion, Wrench, check_frame
 from fivebar_pin.dynamics.forward import constant_torque, require_consistent
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.simulation.chart_motion import ClosedState, Inputs
@@ -88,7 +88,7 @@ def simulate(
     integer("max_steps", max_steps, least=1)
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
-    system = System.of(chain, tuple(springs))
+    system = EquationsOfMotion.of(chain, tuple(springs))
     for frame in external or {}:
         check_frame(chain, frame)
     state = _initial_state(system, checked("q", q, (chain.nq,)), checked("v", v, (chain.nv,)), initial)
@@ -96,7 +96,7 @@ def simulate(
     return run(system, inputs, state, times, rtol=rtol, atol=atol, max_steps=max_steps, progress=progress)
 
 
-def _initial_state(system: System, q: Array, v: Array, initial: str) -> ClosedState:
+def _initial_state(system: EquationsOfMotion, q: Array, v: Array, initial: str) -> ClosedState:
     """Return the state brought to round-off, once it is consistent or asked to be made so."""
     manifold = system.manifold
     if initial == "check":
