@@ -20,6 +20,7 @@ from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameErro
 from fivebar_pin.mechanism.closing import Limits, polish, residual_of, search
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
+from fivebar_pin.mechanism.plane import plane_normal
 from fivebar_pin.mechanism.tree import Poses
 
 SpaceName = Literal["auto", "planar", "spatial"]
@@ -99,31 +100,13 @@ def space_of(chain: ClosedChain, samples: Samples, space: SpaceName = "auto") ->
     if space not in ("auto", "planar", "spatial"):
         raise UnknownNameError("space", space, ("auto", "planar", "spatial"))
     nb = chain.model.njoints - 1
-    normal = None if space == "spatial" else _normal(samples.poses.S, chain.length)
+    normal = None if space == "spatial" else plane_normal(samples.poses.S, chain.length)
     if normal is None:
         if space == "planar":
             raise InvalidInputError("space", space, f"{chain.name} does not move in parallel planes")
         return Space(chain.joints, None, frozen(np.broadcast_to(np.eye(3), (nb, 3, 3))), chain.length)
     axes = [plane_axes(samples.poses.R[j][0].T @ normal) for j in range(1, nb + 1)]
     return Space(chain.joints, frozen(normal), frozen(axes), chain.length)
-
-
-def _normal(S: Array, length: float, tolerance: float = 1e-9) -> Array | None:
-    """Return the common normal of the motion, or None.  S (n, 6, nv)."""
-    columns = np.moveaxis(S, 1, 2).reshape(-1, 6)
-    angular = columns[:, 3:]
-    turning = angular[np.linalg.norm(angular, axis=1) > tolerance]
-    if not turning.size:
-        return None
-    n = turning[0] / np.linalg.norm(turning[0])
-    k = int(np.argmax(np.abs(n)))
-    n = n * np.sign(n[k])
-    if np.linalg.norm(np.cross(angular, n), axis=1).max() > tolerance:
-        return None
-    if np.abs(columns[:, :3] @ n).max() > tolerance * max(1.0, length):
-        return None
-    snapped = np.where(np.abs(n) < 1e-12, 0.0, n)
-    return np.asarray(snapped / np.linalg.norm(snapped))
 
 
 class _Shelf:

@@ -15,8 +15,8 @@ from fivebar_pin.diagnosis.report import ActuatedSet, Actuation, Diagnosis, Find
 from fivebar_pin.dynamics.reactions import reactions
 from fivebar_pin.mechanism import mobility
 from fivebar_pin.mechanism.closing import closed_enough, residual_of
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.mobility import Site
 from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
 
@@ -53,12 +53,12 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     generic = mobility.generic_site(chain, here, seed, _REACHED) if _is_closed(loops, start) else here
     if q is None and here.rank < generic.rank:
         findings.append(Finding("warning", _jump(chain, here, generic, "the configuration nearest to the neutral one")))
-        here, gap = generic, float(mobility.gap(loops, generic.q[None])[0])
+        here, gap = generic, float(generic.gap[0])
     actuation, undetermined, excess = _actuation(chain, generic)
     sets = mobility.determining_sets(chain, generic if here.rank < generic.rank else here, _SETS)
     redundant = _redundant_rows(loops, here, generic)
-    sigma = mobility.passive_sigma(loops, here.J, loops.actuated)
-    joints, closures = _determinate(chain, here.q)
+    sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
+    joints, closures = _determinate(chain, here.q[0])
     findings += _about_mobility(chain, here, generic, redundant)
     findings += _about_actuation(chain, actuation, undetermined, excess, sets, generic)
     findings += _about_singularity(chain, here, generic, actuation, sigma)
@@ -66,14 +66,14 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     findings += _about_inertia(chain, generic)
     return Diagnosis(
         name=chain.name,
-        q=frozen(here.q),
+        q=frozen(here.q[0]),
         gap=gap,
         rows=loops.m,
         rank=here.rank,
         generic_rank=generic.rank,
         mobility=chain.nv - here.rank,
         generic_mobility=chain.nv - generic.rank,
-        singular_values=frozen(singular_values(loops.scaled(here.J))),
+        singular_values=frozen(singular_values(loops.scaled(here.J[0]))),
         redundant=redundant,
         actuated=chain.actuated,
         actuation=actuation,
@@ -81,7 +81,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         excess=excess,
         actuated_sets=tuple(ActuatedSet(names, value) for names, value in sets),
         sigma=sigma,
-        amplification=_amplification(loops, here.J, sigma),
+        amplification=_amplification(loops, here.J[0], sigma),
         determinate_joints=joints,
         determinate_closures=closures,
         joints=chain.joints,
@@ -133,7 +133,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
     return found, gap
 
 
-def _redundant_rows(loops: Loops, here: Site, generic: Site) -> tuple[RedundantRow, ...]:
+def _redundant_rows(loops: Loops, here: Configurations, generic: Configurations) -> tuple[RedundantRow, ...]:
     names = [(c.name, row) for c in loops.closures for row in c.row_names]
     always, extra = mobility.redundant_combinations(loops, here)
     beyond: str = "here" if here.rank < generic.rank else "closed"
@@ -146,10 +146,10 @@ def _redundant_rows(loops: Loops, here: Site, generic: Site) -> tuple[RedundantR
     return tuple(out)
 
 
-def _actuation(chain: ClosedChain, site: Site) -> tuple[Actuation, tuple[str, ...], int]:
+def _actuation(chain: ClosedChain, site: Configurations) -> tuple[Actuation, tuple[str, ...], int]:
     """Return the verdict, the joints left free when the actuated ones are held, and the number of motors too many."""
     loops = loops_of(chain)
-    Jp = mobility.held(site.J, loops.actuated)
+    Jp = mobility.held(site.J[0], loops.actuated)
     free = int(loops.passive.size - loops.rank(Jp))
     excess = chain.na - (chain.nv - site.rank - free)
     undetermined: tuple[str, ...] = ()
@@ -187,7 +187,7 @@ def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], n
     return out[0], out[1]
 
 
-def _jump(chain: ClosedChain, here: Site, generic: Site, where: str) -> str:
+def _jump(chain: ClosedChain, here: Configurations, generic: Configurations, where: str) -> str:
     return (
         f"{where} is singular: mobility {chain.nv - here.rank} instead of {chain.nv - generic.rank}. Several assembly "
         "modes meet there and the motion can go on along any of them. Start from, and stay at, other configurations."
@@ -195,7 +195,7 @@ def _jump(chain: ClosedChain, here: Site, generic: Site, where: str) -> str:
 
 
 def _about_mobility(
-    chain: ClosedChain, here: Site, generic: Site, redundant: tuple[RedundantRow, ...]
+    chain: ClosedChain, here: Configurations, generic: Configurations, redundant: tuple[RedundantRow, ...]
 ) -> Iterator[Finding]:
     if not chain.closures:
         yield Finding("note", "there are no closures: this is an open tree")
@@ -225,7 +225,7 @@ def _about_actuation(
     undetermined: tuple[str, ...],
     excess: int,
     sets: list[tuple[tuple[str, ...], float]],
-    generic: Site,
+    generic: Configurations,
 ) -> Iterator[Finding]:
     names = ", ".join(chain.actuated)
     way_out = (
@@ -249,7 +249,7 @@ def _about_actuation(
 
 
 def _about_singularity(
-    chain: ClosedChain, here: Site, generic: Site, actuation: Actuation, sigma: float
+    chain: ClosedChain, here: Configurations, generic: Configurations, actuation: Actuation, sigma: float
 ) -> Iterator[Finding]:
     if actuation not in (Actuation.EXACT, Actuation.OVER) or here.rank < generic.rank or sigma >= _NEAR:
         return
@@ -267,7 +267,7 @@ def _about_singularity(
         )
 
 
-def _about_parts(chain: ClosedChain, here: Site, generic: Site) -> Iterator[Finding]:
+def _about_parts(chain: ClosedChain, here: Configurations, generic: Configurations) -> Iterator[Finding]:
     loops, model = loops_of(chain), chain.model
     looped = np.zeros(chain.nv, dtype=np.bool_)
     for anchored in loops.anchored:
@@ -288,23 +288,23 @@ def _about_parts(chain: ClosedChain, here: Site, generic: Site) -> Iterator[Find
     if dead:
         yield Finding("note", f"{', '.join(_owners(chain, np.array(dead)))} stands still here (dead point)")
     lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
-    outside = np.flatnonzero((here.q < lower - _CLOSED) | (here.q > upper + _CLOSED))
+    outside = np.flatnonzero((here.q[0] < lower - _CLOSED) | (here.q[0] > upper + _CLOSED))
     if outside.size:
         owners = [j for j in range(1, model.njoints) if np.isin(outside, _columns_q(model, j)).any()]
         names = ", ".join(model.names[j] for j in owners)
         yield Finding("warning", f"the configuration is outside the limits of {names}")
 
 
-def _about_inertia(chain: ClosedChain, site: Site) -> Iterator[Finding]:
-    for severity, text in inertias.inertia_problems(chain, inertias.plane_normal(chain, site)):
+def _about_inertia(chain: ClosedChain, site: Configurations) -> Iterator[Finding]:
+    for severity, text in inertias.inertia_problems(chain, inertias.normals(chain, site)):
         yield Finding("warning" if severity == "warning" else "error", text)
     text = inertias.mass_problem(chain, site)
     if text:
         yield Finding("error", text)
 
 
-def _is_still(site: Site, k: int) -> bool:
-    return bool(np.abs(site.free[k]).max(initial=0.0) < _STILL)
+def _is_still(site: Configurations, k: int) -> bool:
+    return bool(np.abs(site.free[0, k]).max(initial=0.0) < _STILL)
 
 
 def _owners(chain: ClosedChain, columns: npt.NDArray[np.intp]) -> tuple[str, ...]:
