@@ -10,7 +10,7 @@ The closure forces do no work on N and never appear.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,20 +18,19 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, numeric
+from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import ClosureKind
-from fivebar_pin.dynamics.elastic import SpringForces, checked_springs, frame_points, spring_forces, wrench_force
+from fivebar_pin.dynamics.elastic import SpringForces, checked_springs, spring_forces
 from fivebar_pin.dynamics.mass import depth_first, mass_matrix
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.dynamics.wrenches import moved_to_origin
+from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.manifold import Manifold, manifold_of
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["EquationsOfMotion", "ReducedEquations", "Slip", "Wrench", "check_frame", "checked_wrench"]
+__all__ = ["EquationsOfMotion", "ReducedEquations", "Slip"]
 
-
-Wrench = npt.ArrayLike | Callable[[float, Array, Array], npt.ArrayLike]
 
 _FEW = 6  # up to here one Pinocchio call per sample beats the batch
 _STICKING = 1e-10  # yield of joints that stick, as part of the largest, below which they hold each other [-]
@@ -143,11 +142,8 @@ class EquationsOfMotion:
 
     def wrench_forces(self, point: Configurations, external: Mapping[str, Array]) -> Array:
         """Return the generalised forces (n, nv) of wrenches (n, 6) on frames."""
-        out = np.zeros((point.q.shape[0], self.chain.nv))
-        for frame, wrench in external.items():
-            origin, J = frame_points(self.chain, self.manifold.loops, frame, point.poses)
-            out += wrench_force(origin, J, wrench)
-        return out
+        acting = moved_to_origin(self.chain, point.poses, external)
+        return np.asarray(np.sum(acting.torques(self.manifold.loops.tree, point.poses), axis=0))
 
     def project_velocity(self, point: Configurations, v: Array, rank: int) -> Array:
         """Return the velocity (nv,) that a sudden closing of the loops leaves of v: nearest in kinetic energy."""
@@ -192,28 +188,6 @@ class EquationsOfMotion:
     @cached_property
     def _ordered(self) -> bool:
         return depth_first(self.chain.model)
-
-
-def checked_wrench(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] | None, n: int) -> dict[str, Array]:
-    """Return external wrenches (n, 6) by frame name.
-
-    Raises:
-        UnknownNameError: a frame that does not exist.
-        InvalidInputError: a wrong shape.
-    """
-    out = {}
-    for name, wrench in (external or {}).items():
-        check_frame(chain, name)
-        w = numeric(f"external[{name!r}]", wrench)
-        out[name] = checked(f"external[{name!r}]", np.broadcast_to(w, (n, 6)) if w.shape == (6,) else w, (n, 6))
-    return out
-
-
-def check_frame(chain: ClosedChain, name: str) -> None:
-    """Raise when an external force names a frame that the chain does not have."""
-    names = [f.name for f in chain.model.frames]
-    if name not in names:
-        raise UnknownNameError("frame of an external force", name, names)
 
 
 def _solve_inertia(inertia: Array, force: Array) -> Array:

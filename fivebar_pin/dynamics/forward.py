@@ -10,9 +10,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, finite, numeric
+from fivebar_pin._arrays import TINY, Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import EquationsOfMotion, checked_wrench
+from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.springs import JointSpring, Spring
@@ -68,7 +69,7 @@ def forward_dynamics(
     T = checked("tau", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na))
     point = system.manifold.at(Q)
     require_consistent(system, point, V)
-    applied = system.wrench_forces(point, checked_wrench(chain, external, n))
+    applied = system.wrench_forces(point, checked_wrenches(chain, external, n))
     applied[:, chain.actuated_index] += T
     a = system.accelerations(point, V, applied, system.manifold.rank_of(point))
     return np.asarray(a[0]) if single else a
@@ -96,7 +97,7 @@ def require_consistent(system: EquationsOfMotion, point: Configurations, v: Arra
         )
     u = v / scale
     rate = point.independent.rate(u)
-    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), 1e-300)
+    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), TINY)
     worst = int(np.argmax(rate - bound))
     if rate[worst] > bound[worst]:
         raise InvalidInputError(

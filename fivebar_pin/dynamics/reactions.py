@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, cross, finite, frozen
-from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import closure as rows
 from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_wrenches
 from fivebar_pin.dynamics.elastic import body_wrenches
+from fivebar_pin.dynamics.wrenches import moved_to_origin
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.mechanism.tree import Poses
@@ -78,7 +79,7 @@ def reactions(
     bodies = Bodies.of(chain)
     moving = body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
-    applied = _applied(chain, poses, external, moving.rate.shape)
+    applied = moved_to_origin(chain, poses, external).on_bodies(moving.rate.shape[1])
     sprung = body_wrenches(chain, loops, springs, trajectory.v, poses)
     unbalanced = np.array(tree_torque)
     unbalanced[:, loops.actuated] -= torque
@@ -142,18 +143,6 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     )
 
 
-def _applied(chain: ClosedChain, poses: Poses, external: Mapping[str, Array], shape: tuple[int, ...]) -> Array:
-    """Return the external wrench on every body at the world origin (n, nb, 6)."""
-    applied = np.zeros(shape)
-    for name, wrench in external.items():
-        frame = find_frame(chain.model, name)
-        j = int(frame.parentJoint)
-        if j:
-            point = poses.p[j] + np.matmul(poses.R[j], np.array(frame.placement.translation))
-            applied[:, j - 1] += _at_origin(wrench, point)
-    return applied
-
-
 def determinate(free: Array) -> Array:
     """Return the projections (n, x, 3, 3) of forces onto what redundant closures leave alone.  free (n, k, x, 3)."""
     n, _, x, _ = free.shape
@@ -198,10 +187,6 @@ def _subtree(chain: ClosedChain, wrench: Array) -> Array:
         if parent:
             out[..., parent - 1, :] += out[..., j - 1, :]
     return out
-
-
-def _at_origin(wrench: Array, point: Array) -> Array:
-    return np.concatenate([wrench[..., :3], wrench[..., 3:] + cross(point, wrench[..., :3])], axis=-1)
 
 
 def _at_point(wrench: Array, point: Array) -> Array:

@@ -107,7 +107,7 @@ def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Arr
             loops.set_actuated(closed.q, x)
             return np.asarray(closed.q[0])
         if np.array_equal(at, x) and closed_enough(loops, here.gap, tolerance)[0]:
-            return q[0]  # a search would not find it again: it converges badly at a singular place
+            return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
     loops.set_actuated(q, x)
     if not loops.m:
         return np.asarray(q[0])

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from fivebar_pin._arrays import Array, checked, numeric
-from fivebar_pin.dynamics.equations import EquationsOfMotion, Slip, Wrench
+from fivebar_pin.dynamics.equations import EquationsOfMotion, Slip
+from fivebar_pin.dynamics.wrenches import Wrench
 from fivebar_pin.errors import SingularityError, SolverError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.manifold import Chart

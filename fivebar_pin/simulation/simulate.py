@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite, integer, number
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import EquationsOfMotion, Wrench, check_frame
+from fivebar_pin.dynamics.equations import EquationsOfMotion
 from fivebar_pin.dynamics.forward import constant_torque, require_consistent
+from fivebar_pin.dynamics.wrenches import Wrench, require_frames
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.simulation.chart_motion import ClosedState, Inputs
 from fivebar_pin.simulation.integrator import run
@@ -89,8 +90,7 @@ def simulate(
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
     system = EquationsOfMotion.of(chain, tuple(springs))
-    for frame in external or {}:
-        check_frame(chain, frame)
+    require_frames(chain, external or {})
     state = _initial_state(system, checked("q", q, (chain.nq,)), checked("v", v, (chain.nv,)), initial)
     inputs = Inputs(tau if callable(tau) else constant_torque(chain, tau), dict(external or {}))
     return run(system, inputs, state, times, rtol=rtol, atol=atol, max_steps=max_steps, progress=progress)

@@ -57,7 +57,7 @@ def test_every_road_ends_at_round_off(chain):
     sought = search(loops, starts)
     assert np.abs(residual_of(loops, sought)).max() < 1e-8
     np.testing.assert_allclose(polish(loops, sought).q, near.q, atol=1e-10)
-    q_all, residual = close(chain, starts, 1e-12)
+    _, residual = close(chain, starts, 1e-12)
     assert residual.max() < 1e-14
     least = [manifold.project(start, 1e-12) for start in starts]
     assert max(float(np.abs(point.reduced).max()) for point in least) < 100.0 * ROUND_OFF
@@ -85,7 +85,7 @@ def test_a_chart_leads_to_the_configuration_with_its_coordinates(chain):
 def test_a_search_keeps_limits():
     chain = CHAINS["four-bar"]
     loops, q = loops_of(chain), place(chain)
-    start = q + [0.3, 0.2, -0.2]
+    start = q + np.array([0.3, 0.2, -0.2])
     every = np.arange(3)
     limits = Limits(np.array([0]), start[:1] - 0.05, start[:1] + 0.05)
     found = search(loops, start[None], columns=every, limits=limits)

@@ -118,7 +118,7 @@ def test_the_bound_on_tilts_is_the_one_that_is_written_down():
 
 
 def test_a_gantry_has_the_conditions_of_its_two_masses_in_the_plane():
-    """What slides along x moves all three masses, what slides along y the second alone: two conditions for the force."""
+    """What slides along x moves all three masses, what slides along y the second alone: two conditions."""
     assert (
         fb.balance_conditions(gantry(), "force").rank == fb.balance_conditions(gantry(base=TILTED), "force").rank == 2
     )
