@@ -13,6 +13,10 @@ ROUND_OFF = 2.0**-40
 to some hundred of them and a chain of solved equations adds to that [-]."""
 
 
+TINY = 1e-300
+"""Least divisor: x / max(y, TINY) is huge where y is zero, and no number is none [any unit]."""
+
+
 def table_text(header: str, body: Array) -> str:
     """Return a table (n, k) as csv text below a header line, every digit kept."""
     text = io.StringIO()
