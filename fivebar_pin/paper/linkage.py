@@ -22,6 +22,7 @@ from fivebar_pin.paper.positions import CArray, position
 
 __all__ = ["FiveBar"]
 
+_STRONG = 1e6  # effort and velocity limit [N m, rad/s]: none that matters
 _WIDE = 1e4  # joint limit [rad]: the angles may turn many times
 _COLOURS = ((0.16, 0.44, 0.70), (0.90, 0.62, 0.10), (0.34, 0.62, 0.32), (0.76, 0.30, 0.28))
 
@@ -157,7 +158,7 @@ def _all_positive(name: str, values: Array, bound: str) -> None:
 
 def _add_link(model: pin.Model, parent: int, joint: str, x: float, body: pin.Inertia, link: str) -> int:
     """Add a hinge about z at x on the parent's x axis, and the body that it carries."""
-    limit, far = np.full(1, 1e6), np.full(1, _WIDE)
+    limit, far = np.full(1, _STRONG), np.full(1, _WIDE)
     placement = pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
     index = int(model.addJoint(parent, pin.JointModelRZ(), placement, joint, limit, limit, -far, far))
     model.appendBodyToJoint(index, body, pin.SE3.Identity())

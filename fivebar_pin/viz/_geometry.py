@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]
 
+_SAME = 1e-9  # distance of points that are one [of the body, and for its size at least so many m]
+_ALONG = 1e-9  # component that counts as none [-]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poses:
@@ -139,7 +142,7 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
 def _distinct(points: Array) -> Array:
     """Return the points without repetitions, in their order."""
     kept: list[Array] = []
-    tolerance = 1e-9 * max(float(np.max(np.abs(points))), 1e-9)
+    tolerance = _SAME * max(float(np.max(np.abs(points))), _SAME)
     for point in points:
         if all(float(np.linalg.norm(point - other)) > tolerance for other in kept):
             kept.append(point)
@@ -163,5 +166,5 @@ def find_view(chain: ClosedChain, q: Array) -> View:
     up /= np.linalg.norm(up)
     right = np.cross(up, normal)
     # Of the two sides of the plane, look from the one that has x (else y) to the right.
-    facing = right[0] if abs(right[0]) > 1e-9 else right[1]
+    facing = right[0] if abs(right[0]) > _ALONG else right[1]
     return View(right * np.sign(facing or 1.0), up, planar=True)

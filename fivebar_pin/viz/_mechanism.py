@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_mechanism"]
 
+_SMALLEST = 1e-6  # scale of an arrow of no length: none may be zero [-]
+_STILL = 1e-12  # step of a trace that has no direction [m]
 _RIBBON_POINTS = 2000
 """Points of a trace that are drawn wide; the line itself holds all of them."""
 
@@ -175,7 +177,7 @@ def _ribbon(points: Array, normal: Array, half: float) -> tuple[Array, Array]:
     step = np.gradient(points, axis=0) if len(points) > 1 else np.zeros_like(points)
     side = np.cross(normal, step)
     length = np.linalg.norm(side, axis=1, keepdims=True)
-    side = np.divide(side, length, out=np.zeros_like(side), where=length > 1e-12)
+    side = np.divide(side, length, out=np.zeros_like(side), where=length > _STILL)
     vertices = np.concatenate([points + half * side, points - half * side])
     n = len(points)
     k = np.arange(n - 1)
@@ -195,9 +197,9 @@ def _draw_force(recorder: Recorder, path: str, drawing: Drawing, force: Array) -
         recorder.set(f"{path}/{part}", "renderOrder", 4)
     length = drawing.arrow * np.linalg.norm(force, axis=1)
     # A short arrow is drawn smaller as a whole; an arrow of no length keeps a scale above zero.
-    size = np.clip(length / (1.5 * head), 1e-6, 1.0)
-    shaft = np.maximum(length - head * size, 1e-6 * head)
-    directions = np.where(size[:, None] > 1e-6, force, drawing.view.up)
+    size = np.clip(length / (1.5 * head), _SMALLEST, 1.0)
+    shaft = np.maximum(length - head * size, _SMALLEST * head)
+    directions = np.where(size[:, None] > _SMALLEST, force, drawing.view.up)
     zero = np.zeros_like(length)
     recorder.animate(path, drawing.times, quaternion=_quaternions(np.array([along(f) for f in directions])))
     recorder.animate(f"{path}/shaft", drawing.times, scale=np.stack([size, size, shaft], axis=1))
