@@ -59,7 +59,7 @@ class ClosedChain(Immutable):
                 raise UnknownNameError("frame", visual.frame, sorted(frames))
 
     def __repr__(self) -> str:
-        closures = ", ".join(f"{c.name} ({c.kind.value})" for c in self.closures) or "none"
+        closures = ", ".join(f"{c.name} ({c.kind})" for c in self.closures) or "none"
         return (
             f"ClosedChain({self.name!r}: {self.model.njoints - 1} joints, nq = {self.nq}, nv = {self.nv}; "
             f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'})"
@@ -125,7 +125,7 @@ class ClosedChain(Immutable):
         spans, origin = [], np.array(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
         places = [(model.parents[j], model.jointPlacements[j].translation) for j in range(1, model.njoints)]
         frames = frames_by_name(model) if self.closures else {}
-        ends = [frames[f] for closure in self.closures for f in closure.frames]
+        ends = [frames[f] for closure in self.closures for f in closure.ends]
         for parent, place in [*places, *((f.parentJoint, f.placement.translation) for f in ends)]:
             spans.append(float(np.linalg.norm(place - origin if parent == 0 else place)))
         real = [s for s in spans if s > 0.0]

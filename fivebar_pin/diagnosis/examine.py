@@ -218,7 +218,7 @@ def _about_mobility(
             "only with these exact dimensions; loosen the closure if that is not meant.",
         )
     for closure, anchored in zip(chain.closures, loops_of(chain).anchored, strict=True):
-        if not anchored.moved.size:
+        if not anchored.columns.size:
             yield Finding("warning", f"closure {closure.name} joins bodies that no joint moves apart: it holds nothing")
 
 
@@ -274,7 +274,7 @@ def _about_parts(chain: ClosedChain, here: Site, generic: Site) -> Iterator[Find
     loops, model = loops_of(chain), chain.model
     looped = np.zeros(chain.nv, dtype=np.bool_)
     for anchored in loops.anchored:
-        looped[anchored.moved] = True
+        looped[anchored.columns] = True
     looped[loops.actuated] = True
     loose = _owners(chain, np.flatnonzero(~looped))
     if loose and chain.na:
@@ -329,7 +329,7 @@ def _parts(chain: ClosedChain) -> list[tuple[str, ...]]:
         return j
 
     links = [(j, int(model.parents[j])) for j in range(1, model.njoints)]
-    links += [anchored.joints for anchored in loops_of(chain).anchored]
+    links += [pair for c in loops_of(chain).anchored for pair in zip(c.tied, c.tied[1:], strict=False)]
     for a, b in links:
         if a and b:
             group[find(a)] = find(b)

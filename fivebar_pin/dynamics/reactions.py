@@ -9,7 +9,6 @@ import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, block_svd, cross, finite, frozen
 from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.closures import closure as rows
 from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_wrenches
 from fivebar_pin.dynamics.elastic import body_wrenches
 from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
@@ -132,15 +131,16 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     null = np.swapaxes(U[:, :, rank:], 1, 2) * loops.row_scale * loops.length  # (n, k, m)
     wrench, free = [], []
     for anchored, pair in zip(loops.anchored, pairs, strict=True):
-        T = rows.selector(anchored.closure, pair)
+        T = anchored.selector(pair)
         wrench.append(np.einsum("nmi,nm->ni", T, multipliers[:, anchored.rows]))
         free.append(np.einsum("nmi,nkm->nki", T, null[:, :, anchored.rows]))
+    places = [anchored.place(pair) for anchored, pair in zip(loops.anchored, pairs, strict=True)]
     return _ClosureForces(
         frozen(multipliers),
         np.stack(wrench, axis=1),
         np.stack(free, axis=2),
-        np.stack([pair.p2 for pair in pairs], axis=1),
-        np.stack([pair.R1 for pair in pairs], axis=1),
+        np.stack([point for point, _ in places], axis=1),
+        np.stack([axes for _, axes in places], axis=1),
         float(np.abs(unbalanced - np.einsum("nmk,nm->nk", J, multipliers)).max(initial=0.0)),
     )
 

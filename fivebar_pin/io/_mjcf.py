@@ -11,7 +11,7 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.closures import Closure, Point, Revolute, Weld
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._build import build_model
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
@@ -219,18 +219,18 @@ class _Equality:
                 raise self.reader.fail(where, "is not active; remove it or make it active")
             if name.endswith(" axis") and name[: -len(" axis")] in self.hinges:
                 continue
-            kind = ClosureKind.POINT if element.tag == "connect" else ClosureKind.WELD
             frames = self.frames(full, name, where)
             axis = self.hinges.get(name)
             try:
-                if axis is not None and kind is ClosureKind.POINT:
+                if axis is not None and element.tag == "connect":
                     if not any(e.get("name") == f"{name} axis" for e in self.elements):
                         raise self.reader.fail(
                             where, f"is marked as a hinge but lacks its second connect {name + ' axis'!r}"
                         )
-                    closures.append(Closure(frames, ClosureKind.REVOLUTE, axis, name))
+                    closures.append(Revolute(frames, axis, name=name))
                 else:
-                    closures.append(Closure(frames, kind, name=name))
+                    kind = Point if element.tag == "connect" else Weld
+                    closures.append(kind(frames, name=name))
             except FileFormatError:
                 raise
             except FiveBarPinError as error:

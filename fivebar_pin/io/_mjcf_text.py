@@ -8,7 +8,9 @@ and gear ratios; the URDF and its sidecar keep them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -16,7 +18,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
-from fivebar_pin.closures import ClosureKind
+from fivebar_pin.closures import Closure, Point, Revolute, Weld
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
 from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
@@ -157,16 +159,26 @@ class _Writer:
     def equality(self) -> list[str]:
         lines = []
         for closure in self.chain.closures:
-            pair = [self.site(name) for name in closure.frames]
-            lines.append(_closure("weld" if closure.kind is ClosureKind.WELD else "connect", closure.name, pair))
-            if closure.kind is ClosureKind.REVOLUTE:
-                axis = np.asarray(closure.axis)
-                offset = np.eye(4)
-                offset[:3, 3] = axis * self.chain.length
-                ends = [self.second_site(name, offset) for name in closure.frames]
-                lines.append(_closure("connect", f"{closure.name} axis", ends))
-                self.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
+            words = _WORDS.get(type(closure))
+            if words is None:
+                hint = "Save it as URDF only: formats=('urdf',)."
+                raise InvalidInputError(f"closure {closure.name}", closure.kind.value, "has no word in MJCF", hint)
+            lines += words(self, closure)
         return lines
+
+    def connect(self, closure: Closure) -> list[str]:
+        return [_closure("connect", closure.name, [self.site(name) for name in closure.ends])]
+
+    def weld(self, closure: Closure) -> list[str]:
+        return [_closure("weld", closure.name, [self.site(name) for name in closure.ends])]
+
+    def hinge(self, closure: Revolute) -> list[str]:
+        axis, offset = np.asarray(closure.axis), np.eye(4)
+        offset[:3, 3] = axis * self.chain.length
+        lines = self.connect(closure)
+        ends = [self.second_site(name, offset) for name in closure.ends]
+        self.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
+        return [*lines, _closure("connect", f"{closure.name} axis", ends)]
 
     def pose(self, frame: str) -> tuple[str, Array]:
         """Return the link of the body that carries a frame, and the frame's pose there."""
@@ -223,6 +235,14 @@ class _Writer:
             shape = f'type="{visual.shape}" size="{numbers([size[0], 0.5 * size[1]])}"'
         rest = f'rgba="{numbers(visual.rgba)}" contype="0" conaffinity="0" mass="0"'
         return [f"{indent}<geom {shape}{_pose(M)} {rest}/>"]
+
+
+_WORDS: dict[type[Closure], Callable[[_Writer, Any], list[str]]] = {
+    Point: _Writer.connect,
+    Revolute: _Writer.hinge,
+    Weld: _Writer.weld,
+}
+"""How the kinds of closure that MJCF has words for are written."""
 
 
 def _inertia(inertia: pin.Inertia) -> str:

@@ -13,13 +13,13 @@ Unlike the choice of single joints, no chart fails where the mechanism itself is
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.errors import SingularityError
 from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of, open_message
 from fivebar_pin.mechanism.per_chain import once_per_chain
@@ -39,7 +39,7 @@ class Point:
 
     Attributes:
         q: configurations (n, nq).
-        poses, pairs: of the joints and of the closure frames.
+        poses, pairs: of the joints, and what the closures see of them.
         residual: all closure rows (n, m) [m, rad].
         reduced: the scaled independent combinations of them (n, r).
         U, s, Vt: singular value decomposition of the reduced, scaled Jacobian: (n, r, r), (n, r), (n, nv, nv).
@@ -47,7 +47,7 @@ class Point:
 
     q: Array
     poses: Poses
-    pairs: list[FramePair]
+    pairs: list[Any]
     residual: Array
     reduced: Array
     U: Array

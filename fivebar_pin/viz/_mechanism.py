@@ -8,7 +8,6 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
-from fivebar_pin.closures import ClosureKind
 from fivebar_pin.viz._drawing import (
     COLOURS,
     LINK_COLOURS,
@@ -115,22 +114,23 @@ def _draw_closures(recorder: Recorder, path: str, drawing: Drawing) -> None:
     """Draw both frames of each closure: a yellow pin on the first, a smaller dark one on the second."""
     model, r = drawing.chain.model, drawing.radius
     for closure in drawing.chain.closures:
-        for number, name in enumerate(closure.frames):
+        mark = closure.mark
+        for number, name in enumerate(closure.ends):
             frame = find_frame(model, name)
             node = f"{_node(drawing.chain, path, frame.parentJoint)}/closure {safe(closure.name)} {number + 1}"
             recorder.place(node, frame.placement.homogeneous)
             colour = COLOURS["closure"] if number == 0 else COLOURS["joint"]
             wide, long = (1.5 * r, 3.2 * r) if number == 0 else (0.7 * r, 3.6 * r)
-            axis = np.asarray(closure.axis, dtype=np.float64)
-            if closure.kind is ClosureKind.POINT and drawing.view.planar:
+            axis = mark.axis
+            if mark.shape == "ball" and drawing.view.planar:  # seen along the plane's normal it is a pin
                 rotation = drawing.poses.joints[0, frame.parentJoint, :3, :3] @ frame.placement.rotation
                 axis = rotation.T @ drawing.view.normal
-            if closure.kind is ClosureKind.WELD:
+            if mark.shape == "box":
                 recorder.box(f"{node}/mark", (2 * wide, 2 * wide, 2 * wide), colour, np.eye(4))
-            elif closure.kind is ClosureKind.POINT and not drawing.view.planar:
+            elif axis is None:
                 recorder.sphere(f"{node}/mark", wide, colour, np.eye(4))
             else:
-                recorder.cylinder(f"{node}/mark", wide, long, colour, pose(np.zeros(3), axis))
+                recorder.cylinder(f"{node}/mark", wide, mark.stretch * long, colour, pose(np.zeros(3), axis))
 
 
 def _draw_ground(recorder: Recorder, path: str, drawing: Drawing, shapes: tuple[JointShape, ...]) -> None:
