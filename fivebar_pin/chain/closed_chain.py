@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
+from fivebar_pin.chain.counting import counting_turns
 from fivebar_pin.chain.frames import frames_by_name
 from fivebar_pin.chain.visual import Visual
 from fivebar_pin.closures import Closure
@@ -25,7 +26,9 @@ class ClosedChain(Immutable):
     """An open tree, the closures that make loops of it, and the joints that are driven.
 
     Args:
-        model: the open tree; copied, the caller's stays untouched.
+        model: the open tree; copied, the caller's stays untouched. A joint that a coupling ties counts its turns: one
+            whose coordinates are a cosine and a sine is stored as an ordinary revolute joint about the same axis,
+            without limits, so that q has one coordinate for it instead of two (`chain.nq`, not `model.nq`, counts).
         closures: loop closures between frames of the tree.
         actuated: names of the driven joints, in the order of all actuated columns; one degree of freedom each.
         name: what reports call the mechanism; the model's name unless given.
@@ -52,6 +55,8 @@ class ClosedChain(Immutable):
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
         check_tree(self.model)
         check_closures(self.model, self.closures)
+        counted = {name for closure in self.closures for name in closure.counted}
+        object.__setattr__(self, "model", counting_turns(self.model, counted))
         check_actuated(self.model, self.actuated)
         frames = {f.name for f in self.model.frames} if self.visuals else set()
         for visual in self.visuals:
