@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, block_svd, cross, finite, frozen
 from fivebar_pin.chain import ClosedChain, find_frame
@@ -28,6 +29,7 @@ class Reactions(Immutable):
 
     Attributes:
         multipliers: closure forces in the rows of J (n, m); of least norm where the closures are redundant.
+        determinate_rows: which of them are determinate (n, m).
         closure: wrench by body 1 on body 2 at the closure point (n, closures, 6) [N, N m].
         joint: wrench by the parent on the body of every joint, motor and joint springs included, at the joint origin
             (n, nb, 6).
@@ -46,6 +48,7 @@ class Reactions(Immutable):
     """
 
     multipliers: Array
+    determinate_rows: npt.NDArray[np.bool_]
     closure: Array
     joint: Array
     closure_local: Array
@@ -88,6 +91,7 @@ def reactions(
     joint = _seen(carried, slack, np.stack(poses.p[1:], axis=1), np.stack(poses.R[1:], axis=1), unit)
     return Reactions(
         forces.multipliers,
+        forces.determinate_rows,
         closure[0],
         joint[0],
         closure[1],
@@ -105,6 +109,7 @@ def reactions(
 @dataclass(frozen=True, slots=True, eq=False)
 class _ClosureForces:
     multipliers: Array  # (n, m)
+    determinate_rows: npt.NDArray[np.bool_]  # (n, m)
     wrench: Array  # on body 2, at the world origin (n, nc, 6)
     free: Array  # what redundant closures could carry besides, for a basis of unit forces (n, k, nc, 6)
     point: Array  # of the closures (n, nc, 3)
@@ -118,7 +123,8 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     if not loops.m:
         none = np.zeros((n, 0, 6))
         mismatch = float(np.abs(unbalanced).max(initial=0.0))
-        return _ClosureForces(np.zeros((n, 0)), none, none[:, None], none[..., :3], np.zeros((n, 0, 3, 3)), mismatch)
+        axes, rows = np.zeros((n, 0, 3, 3)), np.zeros((n, 0), dtype=np.bool_)
+        return _ClosureForces(np.zeros((n, 0)), rows, none, none[:, None], none[..., :3], axes, mismatch)
     pairs = loops.pairs(poses)
     J = loops.jacobian(poses, pairs)
     scaled = loops.row_scale[:, None] * J * loops.column_scale
@@ -128,6 +134,8 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     inverse = np.where(np.arange(k) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)
     loaded = np.matmul(Vt[:, :k], (unbalanced * loops.column_scale)[..., None])[..., 0] * inverse
     multipliers = np.matmul(U[:, :, :k], loaded[..., None])[..., 0] * loops.row_scale
+    determinate_rows = np.linalg.norm(U[:, :, rank:], axis=2) <= _OPEN
+    determinate_rows.setflags(write=False)
     null = np.swapaxes(U[:, :, rank:], 1, 2) * loops.row_scale * loops.length  # (n, k, m)
     wrench, free = [], []
     for anchored, pair in zip(loops.anchored, pairs, strict=True):
@@ -137,6 +145,7 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     places = [anchored.place(pair) for anchored, pair in zip(loops.anchored, pairs, strict=True)]
     return _ClosureForces(
         frozen(multipliers),
+        determinate_rows,
         np.stack(wrench, axis=1),
         np.stack(free, axis=2),
         np.stack([point for point, _ in places], axis=1),

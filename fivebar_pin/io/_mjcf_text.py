@@ -1,16 +1,12 @@
-"""A chain to MJCF text: bodies at their joints, frames as sites, closures as connect and weld.
+"""A chain to MJCF text: bodies at their joints, frames as sites, closures as equalities (see `_mjcf_words`).
 
-A revolute closure becomes two connects, at the closure's frames and at a second point of the hinge axis; a
-<custom><numeric> entry with the axis marks the pair, so that reading gives the one revolute closure back. A second
-entry keeps the order of joints that were not added depth first. MJCF has no place for velocity limits, rotor inertias
-and gear ratios; the URDF and its sidecar keep them.
+A <custom><numeric> entry keeps the order of joints that were not added depth first. MJCF has no place for velocity
+limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -18,10 +14,10 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
-from fivebar_pin.closures import Closure, Point, Revolute, Weld
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
-from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf import ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf_words import equality_lines
 from fivebar_pin.io._outline import outline
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
 
@@ -38,7 +34,7 @@ def mjcf_text(chain: ClosedChain, folder: Path) -> str:
     """Return the MJCF text of a chain, with meshes named relative to `folder`.
 
     Raises:
-        InvalidInputError: a joint kind that MJCF lacks, or a free joint that does not hang on the world.
+        InvalidInputError: a joint or closure kind that MJCF lacks, or a free joint that does not hang on the world.
     """
     return _Writer(chain, folder).text()
 
@@ -53,11 +49,12 @@ class _Writer:
             self.below.setdefault(joint.parent, []).append(joint)
         self.extra_sites: dict[str, list[tuple[str, Array]]] = {}
         self.numeric: list[str] = []
+        self.tendons: list[str] = []
         self.order: list[int] = []
         self.sites = {j.child for j in self.tree.joints.values() if j.kind == "fixed"}
 
     def text(self) -> str:
-        equality = self.equality()
+        equality = [line for closure in self.chain.closures for line in equality_lines(self, closure)]
         bodies = self.contents(self.tree.root, "    ")
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
@@ -72,6 +69,7 @@ class _Writer:
             f'  <option gravity="{gravity}"/>',
             *_section("asset", meshes),
             *_section("worldbody", bodies),
+            *_section("tendon", self.tendons),
             *_section("equality", equality),
             *_section("actuator", motors),
             *_section("keyframe", self.keyframes()),
@@ -156,30 +154,6 @@ class _Writer:
             words.append(f'actuatorfrcrange="{numbers([low, high])}"')
         return words
 
-    def equality(self) -> list[str]:
-        lines = []
-        for closure in self.chain.closures:
-            words = _WORDS.get(type(closure))
-            if words is None:
-                hint = "Save it as URDF only: formats=('urdf',)."
-                raise InvalidInputError(f"closure {closure.name}", closure.kind.value, "has no word in MJCF", hint)
-            lines += words(self, closure)
-        return lines
-
-    def connect(self, closure: Closure) -> list[str]:
-        return [_closure("connect", closure.name, [self.site(name) for name in closure.ends])]
-
-    def weld(self, closure: Closure) -> list[str]:
-        return [_closure("weld", closure.name, [self.site(name) for name in closure.ends])]
-
-    def hinge(self, closure: Revolute) -> list[str]:
-        axis, offset = np.asarray(closure.axis), np.eye(4)
-        offset[:3, 3] = axis * self.chain.length
-        lines = self.connect(closure)
-        ends = [self.second_site(name, offset) for name in closure.ends]
-        self.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
-        return [*lines, _closure("connect", f"{closure.name} axis", ends)]
-
     def pose(self, frame: str) -> tuple[str, Array]:
         """Return the link of the body that carries a frame, and the frame's pose there."""
         f = find_frame(self.model, frame)
@@ -237,14 +211,6 @@ class _Writer:
         return [f"{indent}<geom {shape}{_pose(M)} {rest}/>"]
 
 
-_WORDS: dict[type[Closure], Callable[[_Writer, Any], list[str]]] = {
-    Point: _Writer.connect,
-    Revolute: _Writer.hinge,
-    Weld: _Writer.weld,
-}
-"""How the kinds of closure that MJCF has words for are written."""
-
-
 def _inertia(inertia: pin.Inertia) -> str:
     """Return a tensor about the mass centre in the form that MuJoCo takes.
 
@@ -267,10 +233,6 @@ def _inertia(inertia: pin.Inertia) -> str:
 
 def _section(tag: str, lines: list[str]) -> list[str]:
     return [f"  <{tag}>", *lines, f"  </{tag}>"] if lines else []
-
-
-def _closure(tag: str, name: str, sites: list[str]) -> str:
-    return f"    <{tag} name={quoteattr(name)} site1={quoteattr(sites[0])} site2={quoteattr(sites[1])}/>"
 
 
 def _pose(M: Array) -> str:
