@@ -19,7 +19,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from fivebar_pin import balancing, io, motion, paper, viz
+    from fivebar_pin import balancing, closures, io, motion, paper, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure, ClosureKind
@@ -53,6 +53,7 @@ __all__ = [
     "balance_conditions",
     "balancing",
     "closure_residual",
+    "closures",
     "complement",
     "diagnose",
     "drive",

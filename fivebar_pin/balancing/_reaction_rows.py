@@ -11,7 +11,6 @@ import numpy as np
 from fivebar_pin._arrays import Array, skew
 from fivebar_pin.balancing._state import gravity_of, state_of, torque_offset, tree_torque
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures import closure as closure_rows
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.trajectory import Trajectory
@@ -32,12 +31,12 @@ def reactions(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array, Array]
         pairs = loops.pairs(state.poses)
         multipliers = np.matmul(_multiplier_map(loops, loops.jacobian(state.poses, pairs)), tau)
         for k, (anchored, pair) in enumerate(zip(loops.anchored, pairs, strict=True)):
-            T = closure_rows.selector(anchored.closure, pair)
+            T = anchored.selector(pair)
             on_second = np.matmul(np.swapaxes(T, 1, 2), multipliers[:, anchored.rows])
             for j, sign in zip(anchored.joints, (1.0, -1.0), strict=True):
                 if j:
                     joint[:, j - 1] += sign * on_second
-            closure[:, k] = _at(on_second, pair.p2)
+            closure[:, k] = _at(on_second, anchored.place(pair)[0])
     for j in range(nb, 0, -1):
         parent = int(chain.model.parents[j])
         if parent:

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
+from fivebar_pin.chain.counting import counting_turns
 from fivebar_pin.chain.frames import frames_by_name
 from fivebar_pin.chain.visual import Visual
 from fivebar_pin.closures import Closure
@@ -25,7 +26,9 @@ class ClosedChain(Immutable):
     """An open tree, the closures that make loops of it, and the joints that are driven.
 
     Args:
-        model: the open tree; copied, the caller's stays untouched.
+        model: the open tree; copied, the caller's stays untouched. A joint that a coupling ties counts its turns: one
+            whose coordinates are a cosine and a sine is stored as an ordinary revolute joint about the same axis,
+            without limits, so that q has one coordinate for it instead of two (`chain.nq`, not `model.nq`, counts).
         closures: loop closures between frames of the tree.
         actuated: names of the driven joints, in the order of all actuated columns; one degree of freedom each.
         name: what reports call the mechanism; the model's name unless given.
@@ -52,6 +55,8 @@ class ClosedChain(Immutable):
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
         check_tree(self.model)
         check_closures(self.model, self.closures)
+        counted = {name for closure in self.closures for name in closure.counted}
+        object.__setattr__(self, "model", counting_turns(self.model, counted))
         check_actuated(self.model, self.actuated)
         frames = {f.name for f in self.model.frames} if self.visuals else set()
         for visual in self.visuals:
@@ -59,7 +64,7 @@ class ClosedChain(Immutable):
                 raise UnknownNameError("frame", visual.frame, sorted(frames))
 
     def __repr__(self) -> str:
-        closures = ", ".join(f"{c.name} ({c.kind.value})" for c in self.closures) or "none"
+        closures = ", ".join(f"{c.name} ({c.kind})" for c in self.closures) or "none"
         return (
             f"ClosedChain({self.name!r}: {self.model.njoints - 1} joints, nq = {self.nq}, nv = {self.nv}; "
             f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'})"
@@ -125,7 +130,7 @@ class ClosedChain(Immutable):
         spans, origin = [], np.array(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
         places = [(model.parents[j], model.jointPlacements[j].translation) for j in range(1, model.njoints)]
         frames = frames_by_name(model) if self.closures else {}
-        ends = [frames[f] for closure in self.closures for f in closure.frames]
+        ends = [frames[f] for closure in self.closures for f in closure.ends]
         for parent, place in [*places, *((f.parentJoint, f.placement.translation) for f in ends)]:
             spans.append(float(np.linalg.norm(place - origin if parent == 0 else place)))
         real = [s for s in spans if s > 0.0]

@@ -20,7 +20,6 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
-from fivebar_pin.closures import ClosureKind
 from fivebar_pin.dynamics.elastic import SpringForces, checked_springs, spring_forces
 from fivebar_pin.dynamics.mass import depth_first, mass_matrix
 from fivebar_pin.dynamics.wrenches import moved_to_origin
@@ -155,7 +154,7 @@ class EquationsOfMotion:
     def _drift(self, point: Configurations, v: Array) -> Array:
         """Return the second rate of the closures at zero joint accelerations (n, m), the loops being closed."""
         loops, n = self.manifold.loops, v.shape[0]
-        if n > _FEW or any(c.kind is not ClosureKind.POINT for c in self.chain.closures):
+        if n > _FEW or not all(c.by_points for c in self.chain.closures):
             return loops.drift(point.pairs, loops.tree.rates(point.q, v, point.poses))
         model, data, out, still = self.chain.model, self.data, np.empty((n, loops.m)), np.zeros(self.chain.nv)
         for i in range(n):
@@ -173,7 +172,7 @@ class EquationsOfMotion:
         """Frame numbers of every closure."""
         model = self.chain.model
         named = frames_by_name(model)
-        found = [[named[name] for name in c.frames] for c in self.chain.closures]
+        found = [[named[name] for name in c.ends] for c in self.chain.closures]
         return [(model.getFrameId(f.name, f.type), model.getFrameId(g.name, g.type)) for f, g in found]
 
     def _mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:

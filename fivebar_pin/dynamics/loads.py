@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -99,6 +100,18 @@ class Loads(Immutable):
     def closure_reactions_local(self) -> Array:
         """The same in the axes of the closure's frame 1 (n, closures, 6) [N, N m]."""
         return self.reactions.closure_local
+
+    @cached_property
+    def multipliers(self) -> Mapping[str, Array]:
+        """Forces in the rows of every closure by its name (n, rows); nan where redundant rows leave them open.
+
+        Of a coupling sum_k c_k q_k = offset it is what is transmitted: it acts with the torque c_k lambda in joint k
+        [N m or N, divided by the unit of c_k]. Of a distance it is the force that stretches the rod [N].
+        """
+        r = self.reactions
+        values = np.where(r.determinate_rows, r.multipliers, np.nan)
+        found = {c.closure.name: frozen(values[:, c.rows]) for c in loops_of(self.chain).anchored}
+        return MappingProxyType(found)
 
     @cached_property
     def bearing_force(self) -> Array:

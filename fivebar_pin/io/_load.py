@@ -191,22 +191,20 @@ def make_chain(
 
 
 def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
-    """Refuse closure frames that do not exist, are ambiguous (a link's name never is), or lie on one body."""
+    """Refuse closures that do not fit the model, or name frames that are ambiguous (a link's name never is)."""
     frames: dict[str, list[pin.Frame]] = {}
     named = frames_by_name(model) if closures else {}
     for frame in model.frames:
         frames.setdefault(frame.name, []).append(frame)
     for k, closure in enumerate(closures):
-        for name in closure.frames:
-            if name not in frames:
-                raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, frames)}")
+        try:
+            closure.check(model, named)
+        except FiveBarPinError as error:
+            raise FileFormatError(file, f"{key}[{k}]: {error}") from error
+        for name in closure.ends:
             same = [f for f in frames[name] if f.type not in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)]
             if len(same) > 1:
                 raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
-        joints = [named[name].parentJoint for name in closure.frames]
-        if joints[0] == joints[1]:
-            body = model.names[joints[0]]
-            raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")
 
 
 def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Path) -> None:

@@ -28,6 +28,8 @@ geom      name class type contype conaffinity condim group priority size materia
 site      name class type group {_POSE} material size fromto rgba user
 connect   name class active solref solimp body1 body2 anchor site1 site2
 weld      name class active solref solimp body1 body2 relpose anchor site1 site2 torquescale
+joint_equality   name class active solref solimp joint1 joint2 polycoef
+tendon_equality  name class active solref solimp tendon1 tendon2 polycoef
 """
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.passive import PassiveMap
 from fivebar_pin.mechanism.rank import Decomposed
@@ -35,7 +35,7 @@ class Configurations:
         return self.loops.tree.poses(self.q)
 
     @cached_property
-    def pairs(self) -> list[FramePair]:
+    def pairs(self) -> list[Any]:
         """World poses of the frames of every closure."""
         return self.loops.pairs(self.poses)
 

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, frozen, numeric
 from fivebar_pin.chain import ClosedChain, Visual
-from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.closures import Point
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.paper.assembly_mode import AssemblyMode
 from fivebar_pin.paper.positions import CArray, position
@@ -116,7 +116,7 @@ class FiveBar(Immutable):
         theta = _add_link(model, psi, "theta_psi", a1, self._body(2), "link2")
         _add_point(model, theta, "O3_link2", a2, "link2")
         _add_point(model, phi, "O3_link3", a3, "link3")
-        closure = Closure(("O3_link2", "O3_link3"), ClosureKind.POINT, name="O3")
+        closure = Point(("O3_link2", "O3_link3"), name="O3")
         return ClosedChain(model, (closure,), ("psi", "gamma"), name="five_bar", visuals=_visuals(self.lengths))
 
     def configuration(

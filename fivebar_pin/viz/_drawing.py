@@ -148,5 +148,5 @@ def amid_ground(chain: ClosedChain) -> Array:
 
 def ground_closures(chain: ClosedChain) -> list[Array]:
     """Return the places of the closure frames that are fixed to the ground."""
-    frames = [find_frame(chain.model, f) for c in chain.closures for f in c.frames]
+    frames = [find_frame(chain.model, f) for c in chain.closures for f in c.ends]
     return [np.array(f.placement.translation) for f in frames if f.parentJoint == 0]

@@ -127,7 +127,7 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
     points = [np.zeros(3)]
     points += [np.array(model.jointPlacements[k].translation) for k in model.children[joint]]
     for closure in chain.closures:
-        for name in closure.frames:
+        for name in closure.ends:
             frame = find_frame(model, name)
             if frame.parentJoint == joint:
                 points.append(np.array(frame.placement.translation))

@@ -24,7 +24,7 @@ from mechanisms import (
 
 import fivebar_pin as fb
 from fivebar_pin.closures import ClosureKind
-from fivebar_pin.closures.closure import log3
+from fivebar_pin.closures.weld import log3
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import Loops, loops_of
 
@@ -213,7 +213,9 @@ def test_closures_reject_what_they_cannot_be():
         fb.Closure(("a",))  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="must be two frame names"):
         fb.Closure("ab")  # type: ignore[arg-type]
-    with pytest.raises(UnknownNameError, match=r"Unknown closure kind '4d'; known: 3d, 6d, revolute"):
+    with pytest.raises(
+        UnknownNameError, match=r"Unknown closure kind '4d'; known: 3d, 6d, coupling, cylindrical, distance, revolute"
+    ):
         fb.Closure(("a", "b"), "4d")  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="must not be zero"):
         fb.Closure(("a", "b"), "revolute", (0.0, 0.0, 0.0))
