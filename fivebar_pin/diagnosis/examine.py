@@ -181,7 +181,8 @@ def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], n
     """Return which reaction components of joints and closures are not marked as open."""
     rest = np.zeros((1, chain.nv))
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
-    found = reactions(chain, still, rest, np.zeros((1, chain.na)), {}, ())
+    bare = chain.with_springs(()) if chain.springs else chain  # what is open does not depend on what pulls
+    found = reactions(bare, still, rest, np.zeros((1, chain.na)), {})
     out = []
     for reaction in (found.joint_local[0], found.closure_local[0]):
         mask = np.isfinite(reaction)

@@ -6,19 +6,18 @@ on a joint        tau = -k (q - rest) - b dq/dt
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, cross
 from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
+from fivebar_pin.errors import SolverError
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["SpringForces", "body_wrenches", "checked_springs", "frame_points", "spring_forces", "wrench_force"]
+__all__ = ["SpringForces", "body_wrenches", "frame_points", "spring_forces", "wrench_force"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,37 +35,10 @@ class SpringForces(Immutable):
     dissipation: Array
 
 
-def checked_springs(chain: ClosedChain, springs: Iterable[Spring | JointSpring]) -> tuple[Spring | JointSpring, ...]:
-    """Return the springs as a tuple once every frame and joint is known to the chain."""
-    frames = [f.name for f in chain.model.frames]
-    springs = tuple(springs)
-    for spring in springs:
-        if isinstance(spring, JointSpring):
-            if spring.joint not in chain.joints:
-                raise UnknownNameError("joint of a spring", spring.joint, chain.joints)
-            nv = chain.model.joints[chain.model.getJointId(spring.joint)].nv
-            if nv != 1:
-                raise InvalidInputError(f"spring on joint {spring.joint}", f"nv = {nv}", "needs one degree of freedom")
-        elif isinstance(spring, Spring):
-            for frame in (spring.frame1, spring.frame2):
-                if frame not in frames:
-                    raise UnknownNameError("frame of a spring", frame, frames)
-        else:
-            raise InvalidInputError("springs", spring, "must hold Spring and JointSpring objects")
-    return springs
-
-
-def spring_forces(
-    chain: ClosedChain,
-    loops: Loops,
-    springs: Iterable[Spring | JointSpring],
-    q: Array,
-    v: Array,
-    poses: Poses,
-) -> SpringForces:
-    """Evaluate all springs at states q (n, nq), v (n, nv)."""
+def spring_forces(chain: ClosedChain, loops: Loops, q: Array, v: Array, poses: Poses) -> SpringForces:
+    """Evaluate all springs of the chain at states q (n, nq), v (n, nv)."""
     total = SpringForces(np.zeros_like(v), np.zeros(v.shape[0]), np.zeros(v.shape[0]))
-    for spring in springs:
+    for spring in chain.springs:
         one = (
             _on_joint(chain, loops, spring, q, v)
             if isinstance(spring, JointSpring)
@@ -76,15 +48,13 @@ def spring_forces(
     return total
 
 
-def body_wrenches(
-    chain: ClosedChain, loops: Loops, springs: Iterable[Spring | JointSpring], v: Array, poses: Poses
-) -> Array:
-    """Return the wrench of the springs between frames on every body, at the world origin (n, nb, 6).
+def body_wrenches(chain: ClosedChain, loops: Loops, v: Array, poses: Poses) -> Array:
+    """Return the wrench of the chain's springs between frames on every body, at the world origin (n, nb, 6).
 
     Springs on joints act through the joint and are not among them.
     """
     out = np.zeros((v.shape[0], chain.model.njoints - 1, 6))
-    for spring in springs:
+    for spring in chain.springs:
         if isinstance(spring, JointSpring):
             continue
         pull = _pull(chain, loops, spring, v, poses)
@@ -141,7 +111,7 @@ def _pull(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Pos
     free = spring.length == 0.0 and spring.damping == 0.0  # then the force is k d, without a direction to define
     if not free and np.any(size < 1e-12 * chain.length):
         raise SolverError(
-            f"spring {spring.frame1}~{spring.frame2} has its ends on one point: the direction of its force is not "
+            f"spring {spring.name} has its ends on one point: the direction of its force is not "
             "defined there. Give it other frames, or a free length of zero and no damping."
         )
     u = d / np.maximum(size, 1e-300)[:, None]

@@ -21,11 +21,10 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array, checked, numeric
 from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import ClosureKind
-from fivebar_pin.dynamics.elastic import SpringForces, checked_springs, frame_points, spring_forces, wrench_force
+from fivebar_pin.dynamics.elastic import SpringForces, frame_points, spring_forces, wrench_force
 from fivebar_pin.dynamics.mass import depth_first, mass_matrix
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.manifold import Manifold, Point, manifold_of
-from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["Equations", "Mode", "System", "Wrench", "check_frame", "checked_wrench"]
 
@@ -68,30 +67,27 @@ class Equations:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A chain with its springs, ready to give accelerations.
+    """A chain, ready to give accelerations.
 
     Attributes:
         chain, manifold: the mechanism and its closed configurations.
-        springs: checked against the chain.
         damping, friction: viscous coefficients and dry friction torques of the joints (nv,).
         data: Pinocchio's workspace, this object's own.
     """
 
     chain: ClosedChain
     manifold: Manifold
-    springs: tuple[Spring | JointSpring, ...]
     damping: Array
     friction: Array
     data: pin.Data
 
     @staticmethod
-    def of(chain: ClosedChain, springs: tuple[Spring | JointSpring, ...]) -> System:
-        """Prepare a chain; checks the springs."""
+    def of(chain: ClosedChain) -> System:
+        """Prepare a chain."""
         model = chain.model
         return System(
             chain,
             manifold_of(chain),
-            checked_springs(chain, springs),
             np.array(model.damping),
             np.array(model.upperDryFrictionLimit),
             model.createData(),
@@ -123,7 +119,7 @@ class System:
         M, bias = self._mass_and_bias(point.q, v)
         N = np.swapaxes(point.Vt[:, rank:], 1, 2) * scale[:, None]  # (n, nv, f)
         force = applied - bias - self.damping * v
-        if self.springs:
+        if self.chain.springs:
             force = force + self.spring_forces(point, v).force
         held = np.zeros_like(v)
         if rank:
@@ -136,7 +132,7 @@ class System:
 
     def spring_forces(self, point: Point, v: Array) -> SpringForces:
         """Return what the springs do at states (n)."""
-        return spring_forces(self.chain, self.manifold.loops, self.springs, point.q, v, point.poses)
+        return spring_forces(self.chain, self.manifold.loops, point.q, v, point.poses)
 
     def wrench_forces(self, point: Point, external: Mapping[str, Array]) -> Array:
         """Return the generalised forces (n, nv) of wrenches (n, 6) on frames."""

@@ -17,7 +17,6 @@ from fivebar_pin.dynamics.reactions import Reactions, determinate, reactions
 from fivebar_pin.dynamics.wrenches import applied_sizes, on_ground
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Loads"]
@@ -36,7 +35,6 @@ class Loads(Immutable):
         about: the point the moments refer to (3,) [m].
         chain, trajectory: what the loads belong to.
         external: wrenches (n, 6) by frame name, as given to `inverse_dynamics`.
-        springs: as given to `inverse_dynamics`.
 
     The armature of a joint is inertia that its motor feels: it counts in torque and `rotor_energy` and carries no
     momentum. A geared rotor that shall count in the shaking moment is modelled as a body.
@@ -52,7 +50,6 @@ class Loads(Immutable):
     trajectory: Trajectory
     tree_torque: Array = field(repr=False)
     external: Mapping[str, Array] = field(default_factory=dict, repr=False)
-    springs: tuple[Spring | JointSpring, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         names = ("torque", "shaking_force", "shaking_moment", *(("frame_force", "frame_moment") if self.loaded else ()))
@@ -75,7 +72,7 @@ class Loads(Immutable):
     @cached_property
     def reactions(self) -> Reactions:
         """Closure forces and joint reactions; components that the model leaves open are nan."""
-        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external, self.springs)
+        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external)
 
     @property
     def joint_reactions(self) -> Array:
@@ -136,7 +133,7 @@ class Loads(Immutable):
     @cached_property
     def _sprung(self) -> SpringForces:
         loops, q = loops_of(self.chain), self.trajectory.q
-        return spring_forces(self.chain, loops, self.springs, q, self.trajectory.v, loops.tree.poses(q))
+        return spring_forces(self.chain, loops, q, self.trajectory.v, loops.tree.poses(q))
 
     @cached_property
     def _bodies(self) -> BodyRates:

@@ -14,7 +14,6 @@ from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_w
 from fivebar_pin.dynamics.elastic import body_wrenches
 from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin.mechanism.tree import Poses
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Reactions", "determinate", "reactions"]
@@ -67,7 +66,6 @@ def reactions(
     tree_torque: Array,
     torque: Array,
     external: Mapping[str, Array],
-    springs: tuple[Spring | JointSpring, ...],
 ) -> Reactions:
     """Compute all reactions; see `Reactions`."""
     loops = loops_of(chain)
@@ -78,7 +76,7 @@ def reactions(
     moving = body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
     applied = _applied(chain, poses, external, moving.rate.shape)
-    sprung = body_wrenches(chain, loops, springs, trajectory.v, poses)
+    sprung = body_wrenches(chain, loops, trajectory.v, poses)
     unbalanced = np.array(tree_torque)
     unbalanced[:, loops.actuated] -= torque
     forces = _closure_forces(loops, poses, unbalanced)

@@ -7,7 +7,7 @@ stabilise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -20,7 +20,6 @@ from fivebar_pin.dynamics.forward import constant_torque, require_consistent
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.simulation.chart_motion import ClosedState, Inputs
 from fivebar_pin.simulation.integrator import run
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Torque", "simulate"]
@@ -37,7 +36,6 @@ def simulate(
     tau: Torque = None,
     t: npt.ArrayLike | None = None,
     *,
-    springs: Iterable[Spring | JointSpring] = (),
     external: Mapping[str, Wrench] | None = None,
     initial: Literal["check", "project"] = "check",
     rtol: float = 1e-11,
@@ -57,7 +55,6 @@ def simulate(
         tau: torque of the actuated joints: constant (na,), one number where there is one motor, or a function
             (t, q, v) of either [N m or N]; no torque unless given.
         t: increasing output times (n,) [s]; always needed.
-        springs: springs and dampers.
         external: forces from outside: frame name -> wrench (6,) or a function (t, q, v) -> (6,), force [N] and moment
             [N m] in world axes at the frame's origin.
         initial: "check" refuses a state that does not keep the loops closed; "project" moves it to a near one that
@@ -89,7 +86,7 @@ def simulate(
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
     integer("max_steps", max_steps, least=1)
-    system = System.of(chain, tuple(springs))
+    system = System.of(chain)
     for frame in external or {}:
         check_frame(chain, frame)
     state = _initial_state(system, checked("q", q, (chain.nq,)), checked("v", v, (chain.nv,)), initial)
