@@ -10,7 +10,7 @@ moment m c and inertia about the joint origin, in one vector pi. Along any motio
     linear momentum p = Y_p(q, v) pi,       angular momentum L = Y_L(q, v) pi,
     shaking force and moment                F = -dp/dt = Y_F(q, v, a) pi,     M = -dL/dt = Y_M(q, v, a) pi,
     frame force and moment                  the same with the weight,
-    motor torque                            tau = N^T Y_t(q, v, a) pi + (friction, rotors),
+    motor torque                            tau = N^T Y_t(q, v, a) pi + (friction, rotors, springs),
 
 and so are joint reactions and energies: none of these matrices knows the masses (`regressor`). N is the complement,
 v = N v_a. The closures enter through N alone, so nothing below depends on the kind of mechanism.
