@@ -67,7 +67,7 @@ def run_conditions(chosen: argparse.Namespace) -> int:
     console = _tables.console()
     console.print(str(conditions), markup=False, soft_wrap=True)
     residual = float(np.abs(conditions.residual(chain)).max(initial=0.0))
-    sizes = np.abs(conditions.matrix) @ np.abs(chain.inertial_parameters.reshape(-1))
+    sizes = np.abs(conditions.matrix) @ np.abs(chain.inertial_parameters.reshape(-1)) + np.abs(conditions.offset)
     words = figures(residual, float(sizes.max(initial=0.0)))
     console.print(f"largest residual of {chain.name} as it is: {words} kg", markup=False)
     return 0

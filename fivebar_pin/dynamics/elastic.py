@@ -6,7 +6,7 @@ on a joint        tau = -k (q - rest) - b dq/dt
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["SpringForces", "body_wrenches", "frame_points", "spring_forces", "wrench_force"]
+__all__ = ["SpringForces", "body_wrenches", "frame_points", "resting_force", "spring_forces", "wrench_force"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,8 +37,20 @@ class SpringForces(Immutable):
 
 def spring_forces(chain: ClosedChain, loops: Loops, q: Array, v: Array, poses: Poses) -> SpringForces:
     """Evaluate all springs of the chain at states q (n, nq), v (n, nv)."""
+    return _sum(chain, chain.springs, loops, q, v, poses)
+
+
+def resting_force(chain: ClosedChain, loops: Loops, q: Array, poses: Poses) -> Array:
+    """Return the generalised force (n, nv) of the chain's springs at rest in q (n, nq), where dampers play no part."""
+    undamped = tuple(replace(spring, damping=0.0) for spring in chain.springs)
+    return _sum(chain, undamped, loops, q, np.zeros((q.shape[0], chain.nv)), poses).force
+
+
+def _sum(
+    chain: ClosedChain, springs: tuple[Spring | JointSpring, ...], loops: Loops, q: Array, v: Array, poses: Poses
+) -> SpringForces:
     total = SpringForces(np.zeros_like(v), np.zeros(v.shape[0]), np.zeros(v.shape[0]))
-    for spring in chain.springs:
+    for spring in springs:
         one = (
             _on_joint(chain, loops, spring, q, v)
             if isinstance(spring, JointSpring)
