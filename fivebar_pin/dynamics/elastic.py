@@ -19,6 +19,8 @@ from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["SpringForces", "body_wrenches", "frame_points", "resting_force", "spring_forces", "wrench_force"]
 
+_TOGETHER = 1e-12  # distance of a spring's ends that is round-off: they lie on one point [chain lengths]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpringForces(Immutable):
@@ -28,11 +30,21 @@ class SpringForces(Immutable):
         force: generalised force on the tree (n, nv) [N m or N].
         energy: stored (n,) [J].
         dissipation: power the dampers take (n,) [W].
+        size: sum of the sizes of all springs' forces on the tree (n, nv) [N m or N].
     """
 
     force: Array
     energy: Array
     dissipation: Array
+    size: Array
+
+    def __add__(self, other: SpringForces) -> SpringForces:
+        return SpringForces(
+            self.force + other.force,
+            self.energy + other.energy,
+            self.dissipation + other.dissipation,
+            self.size + other.size,
+        )
 
 
 def spring_forces(chain: ClosedChain, loops: Loops, q: Array, v: Array, poses: Poses) -> SpringForces:
@@ -49,14 +61,13 @@ def resting_force(chain: ClosedChain, loops: Loops, q: Array, poses: Poses) -> A
 def _sum(
     chain: ClosedChain, springs: tuple[Spring | JointSpring, ...], loops: Loops, q: Array, v: Array, poses: Poses
 ) -> SpringForces:
-    total = SpringForces(np.zeros_like(v), np.zeros(v.shape[0]), np.zeros(v.shape[0]))
+    none = np.zeros(v.shape[0])
+    total = SpringForces(np.zeros_like(v), none, none, np.zeros_like(v))
     for spring in springs:
-        one = (
-            _on_joint(chain, loops, spring, q, v)
-            if isinstance(spring, JointSpring)
-            else _between(chain, loops, spring, v, poses)
-        )
-        total = SpringForces(total.force + one.force, total.energy + one.energy, total.dissipation + one.dissipation)
+        if isinstance(spring, JointSpring):
+            total = total + _on_joint(chain, loops, spring, q, v)
+        else:
+            total = total + _between(chain, loops, spring, v, poses)
     return total
 
 
@@ -100,7 +111,8 @@ def _on_joint(chain: ClosedChain, loops: Loops, spring: JointSpring, q: Array, v
         deflection = np.remainder(deflection + np.pi, 2.0 * np.pi) - np.pi
     force = np.zeros_like(v)
     force[:, k] = -spring.stiffness * deflection - spring.damping * v[:, k]
-    return SpringForces(force, 0.5 * spring.stiffness * deflection**2, spring.damping * v[:, k] ** 2)
+    energy, dissipation = 0.5 * spring.stiffness * deflection**2, spring.damping * v[:, k] ** 2
+    return SpringForces(force, energy, dissipation, np.abs(force))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,12 +133,12 @@ def _pull(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Pos
     size = np.linalg.norm(d, axis=1)
     stretch = size - spring.length
     free = spring.length == 0.0 and spring.damping == 0.0  # then the force is k d, without a direction to define
-    if not free and np.any(size < 1e-12 * chain.length):
+    if not free and np.any(size < _TOGETHER * chain.length):
         raise SolverError(
             f"spring {spring.name} has its ends on one point: the direction of its force is not "
             "defined there. Give it other frames, or a free length of zero and no damping."
         )
-    u = d / np.maximum(size, 1e-300)[:, None]
+    u = np.divide(d, size[:, None], out=np.zeros_like(d), where=size[:, None] > 0.0)
     # rate of |d|, as a row over v: u . (v_2 - v_1)
     row = np.einsum("ni,nik->nk", u, _point(p2, J2) - _point(p1, J1))
     rate = np.einsum("nk,nk->n", row, v)
@@ -136,7 +148,8 @@ def _pull(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Pos
 def _between(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Poses) -> SpringForces:
     pull = _pull(chain, loops, spring, v, poses)
     energy, dissipation = 0.5 * spring.stiffness * pull.stretch**2, spring.damping * pull.rate**2
-    return SpringForces(-pull.size[:, None] * pull.row, energy, dissipation)
+    force = -pull.size[:, None] * pull.row
+    return SpringForces(force, energy, dissipation, np.abs(force))
 
 
 def _point(p: Array, J: Array) -> Array:
