@@ -224,7 +224,8 @@ class Setup(Immutable):
             R = self.conditions.rows
             labels = tuple(f"[{text}]" for text in self.conditions.equations)
             held = self.conditions.constants(R) / self.mass  # what springs ask of the masses, none without springs
-            blocks.append(Block(labels[: len(R)], "zero", R @ E, R @ X0 + held))
+            if len(R):
+                blocks.append(Block(labels[: len(R)], "zero", R @ E, R @ X0 + held))
             if self.conditions.unheld:
                 never = np.array([self.conditions.unheld / self.mass])
                 blocks.append(Block(labels[-1], "zero", np.zeros((1, n)), never))
