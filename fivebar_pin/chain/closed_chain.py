@@ -14,16 +14,18 @@ from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
 from fivebar_pin.chain.counting import counting_turns
 from fivebar_pin.chain.frames import frames_by_name
+from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.chain.visual import Visual
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["ClosedChain"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedChain(Immutable):
-    """An open tree, the closures that make loops of it, and the joints that are driven.
+    """An open tree, the closures that make loops of it, the joints that are driven, and the springs.
 
     Args:
         model: the open tree; copied, the caller's stays untouched. A joint that a coupling ties counts its turns: one
@@ -33,10 +35,11 @@ class ClosedChain(Immutable):
         actuated: names of the driven joints, in the order of all actuated columns; one degree of freedom each.
         name: what reports call the mechanism; the model's name unless given.
         visuals: shapes to draw.
+        springs: springs and dampers between frames and on joints; all dynamics and balancing take them from here.
 
     Raises:
-        InvalidInputError: a closure within one body, a joint named twice or with several degrees of freedom,
-            placements or inertias that are not finite.
+        InvalidInputError: a closure within one body, a joint named twice or with several degrees of freedom, a spring
+            within one body, placements or inertias that are not finite.
         UnknownNameError: a frame or joint that the model does not have.
     """
 
@@ -45,6 +48,7 @@ class ClosedChain(Immutable):
     actuated: tuple[str, ...]
     name: str = ""
     visuals: tuple[Visual, ...] = ()
+    springs: tuple[Spring | JointSpring, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, pin.Model):
@@ -58,6 +62,7 @@ class ClosedChain(Immutable):
         counted = {name for closure in self.closures for name in closure.counted}
         object.__setattr__(self, "model", counting_turns(self.model, counted))
         check_actuated(self.model, self.actuated)
+        object.__setattr__(self, "springs", checked_springs(self.model, self.springs))
         frames = {f.name for f in self.model.frames} if self.visuals else set()
         for visual in self.visuals:
             if visual.frame not in frames:
@@ -65,9 +70,10 @@ class ClosedChain(Immutable):
 
     def __repr__(self) -> str:
         closures = ", ".join(f"{c.name} ({c.kind})" for c in self.closures) or "none"
+        springs = f"; springs: {', '.join(s.name for s in self.springs)}" if self.springs else ""
         return (
             f"ClosedChain({self.name!r}: {self.model.njoints - 1} joints, nq = {self.nq}, nv = {self.nv}; "
-            f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'})"
+            f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'}{springs})"
         )
 
     @property
@@ -159,6 +165,10 @@ class ClosedChain(Immutable):
     def with_actuated(self, actuated: Iterable[str]) -> ClosedChain:
         """Return the same mechanism driven at other joints."""
         return replace(self, actuated=all_of("actuated", actuated, str))
+
+    def with_springs(self, springs: Iterable[Spring | JointSpring]) -> ClosedChain:
+        """Return the same mechanism with these springs in place of its own."""
+        return replace(self, springs=checked_springs(self.model, springs))
 
 
 def _inertia(joint: str, pi: Array) -> pin.Inertia:

@@ -87,6 +87,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         determinate_rows=multipliers,
         joints=chain.joints,
         closures=tuple(c.name for c in chain.closures),
+        springs=tuple(s.name for s in chain.springs),
         problems=tuple(sorted(findings, key=lambda f: _ORDER.index(f.severity))),
     )
 
@@ -181,7 +182,8 @@ def _determinate(
     """Return which reaction components of joints and closures, and which rows of these, are not marked as open."""
     rest = np.zeros((1, chain.nv))
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
-    found = reactions(chain, still, rest, np.zeros((1, chain.na)), {}, ())
+    bare = chain.with_springs(()) if chain.springs else chain  # what is open does not depend on what pulls
+    found = reactions(bare, still, rest, np.zeros((1, chain.na)), {})
     joints, closures = np.isfinite(found.joint_local[0]), np.isfinite(found.closure_local[0])
     closures[[not c.ends for c in chain.closures]] = False  # a coupling of joints has no wrench
     for mask in (joints, closures):

@@ -117,6 +117,7 @@ class Diagnosis(Immutable):
             of joints has no wrench and no component of one.
         determinate_rows: of every closure the rows whose multipliers are determinate.
         joints, closures: names that the rows of these two belong to.
+        springs: names of the springs.
         problems: findings, the gravest first.
     """
 
@@ -142,6 +143,7 @@ class Diagnosis(Immutable):
     determinate_rows: tuple[tuple[str, ...], ...]
     joints: tuple[str, ...]
     closures: tuple[str, ...]
+    springs: tuple[str, ...]
     problems: tuple[Finding, ...]
 
     @property
@@ -186,6 +188,8 @@ def _lines(d: Diagnosis) -> Iterator[str]:
     for k, row in enumerate(d.redundant):
         yield _entry("" if k else "redundant", str(row))
     yield _entry("actuated", f"{', '.join(d.actuated) or 'none'}: {d.actuation.value}")
+    if d.springs:
+        yield _entry("springs", ", ".join(d.springs))
     if d.undetermined and d.actuated:
         yield _entry("left free", ", ".join(d.undetermined))
     if d.actuation in (Actuation.EXACT, Actuation.OVER):

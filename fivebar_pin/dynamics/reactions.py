@@ -16,7 +16,6 @@ from fivebar_pin.dynamics.wrenches import moved_to_origin
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.mechanism.tree import Poses
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Reactions", "determinate", "reactions"]
@@ -71,7 +70,6 @@ def reactions(
     tree_torque: Array,
     torque: Array,
     external: Mapping[str, Array],
-    springs: tuple[Spring | JointSpring, ...],
 ) -> Reactions:
     """Compute all reactions; see `Reactions`."""
     loops = loops_of(chain)
@@ -82,7 +80,7 @@ def reactions(
     moving = body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
     applied = moved_to_origin(chain, poses, external).on_bodies(moving.rate.shape[1])
-    sprung = body_wrenches(chain, loops, springs, trajectory.v, poses)
+    sprung = body_wrenches(chain, loops, trajectory.v, poses)
     unbalanced = np.array(tree_torque)
     unbalanced[:, loops.actuated] -= torque
     forces = _closure_forces(loops, poses, unbalanced)

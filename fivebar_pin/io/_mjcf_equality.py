@@ -36,11 +36,11 @@ _ACTING = (
 
 
 def check_tendons(reader: MjcfReader, root: ElementTree.Element) -> None:
-    """Refuse tendons that act by themselves; without springs, losses and limits they only measure."""
-    elements = [*root.findall("tendon/*"), *root.findall(".//default/tendon")]
-    for element in elements:
+    """Refuse fixed tendons that act by themselves: they only couple joints. Spatial ones may be springs."""
+    for element in root.findall("tendon/fixed"):
+        full = reader.with_defaults(ElementTree.Element("tendon", element.attrib), None)
         for word in _ACTING:
-            if element.get(word, "0").split()[:1] not in (["0"], ["0.0"], ["false"], ["auto"]):
+            if full.get(word, "0").split()[:1] not in (["0"], ["0.0"], ["false"], ["auto"]):
                 where = f"{element.tag} {element.get('name', '')!r}"
                 raise reader.fail(where, f"{word} of a tendon is not supported; remove it or model it as a force")
 

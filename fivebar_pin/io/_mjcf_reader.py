@@ -30,6 +30,8 @@ connect   name class active solref solimp body1 body2 anchor site1 site2
 weld      name class active solref solimp body1 body2 relpose anchor site1 site2 torquescale
 joint_equality   name class active solref solimp joint1 joint2 polycoef
 tendon_equality  name class active solref solimp tendon1 tendon2 polycoef
+tendon    name class group limited range solreflimit solimplimit solreffriction solimpfriction margin frictionloss
+          springlength stiffness damping armature actuatorfrclimited actuatorfrcrange width material rgba user
 """
 
 

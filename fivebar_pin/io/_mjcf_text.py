@@ -1,7 +1,8 @@
-"""A chain to MJCF text: bodies at their joints, frames as sites, closures as equalities (see `_mjcf_words`).
+"""A chain to MJCF text: bodies at their joints, frames as sites, closures as equalities (see `_mjcf_words`), springs
+as tendons.
 
-A <custom><numeric> entry keeps the order of joints that were not added depth first. MJCF has no place for velocity
-limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
+A <custom><numeric> entry keeps the order of joints that were not added depth first. A spring on a joint is that joint's
+own. MJCF has no place for velocity limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
 from fivebar_pin.io._mjcf import ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf_springs import joint_springs_to_write
 from fivebar_pin.io._mjcf_words import equality_lines
 from fivebar_pin.io._outline import outline
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
+from fivebar_pin.springs import Spring
 
 __all__ = ["mjcf_text"]
 
@@ -34,7 +37,7 @@ def mjcf_text(chain: ClosedChain, folder: Path) -> str:
     """Return the MJCF text of a chain, with meshes named relative to `folder`.
 
     Raises:
-        InvalidInputError: a joint or closure kind that MJCF lacks, or a free joint that does not hang on the world.
+        InvalidInputError: a joint, closure kind or spring that MJCF lacks, a free joint that hangs on a body.
     """
     return _Writer(chain, folder).text()
 
@@ -51,10 +54,12 @@ class _Writer:
         self.numeric: list[str] = []
         self.tendons: list[str] = []
         self.order: list[int] = []
+        self.joint_springs = joint_springs_to_write(chain)
         self.sites = {j.child for j in self.tree.joints.values() if j.kind == "fixed"}
 
     def text(self) -> str:
         equality = [line for closure in self.chain.closures for line in equality_lines(self, closure)]
+        self.add_springs()
         bodies = self.contents(self.tree.root, "    ")
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
@@ -140,8 +145,14 @@ class _Writer:
             values = np.array(getattr(model, field))[v]
             if np.ptp(values) > 0.0:
                 raise InvalidInputError(f"{word} of joint {joint.name}", values.tolist(), "must be one number in MJCF")
-            if values[0]:
-                words.append(f'{word}="{numbers(values[:1])}"')
+            value = float(values[0])
+            if word == "damping" and joint.name in self.joint_springs:
+                value += self.joint_springs[joint.name].damping
+            if value:
+                words.append(f'{word}="{numbers([value])}"')
+        if joint.name in self.joint_springs:
+            spring = self.joint_springs[joint.name]
+            words.append(f'stiffness="{numbers([spring.stiffness])}" springref="{numbers([spring.rest])}"')
         return f"{indent}<joint {' '.join(words)}/>"
 
     def limits(self, joint: JointEntry, j: int) -> list[str]:
@@ -153,6 +164,16 @@ class _Writer:
         if abs(low) < _LIMITLESS and abs(high) < _LIMITLESS and (low, high) != (0.0, 0.0):
             words.append(f'actuatorfrcrange="{numbers([low, high])}"')
         return words
+
+    def add_springs(self) -> None:
+        """Add the springs between frames to the tendons."""
+        for spring in self.chain.springs:
+            if isinstance(spring, Spring):
+                words = f'stiffness="{numbers([spring.stiffness])}" springlength="{numbers([spring.length])}"'
+                if spring.damping:
+                    words += f' damping="{numbers([spring.damping])}"'
+                ends = "".join(f"<site site={quoteattr(self.site(f))}/>" for f in (spring.frame1, spring.frame2))
+                self.tendons.append(f"    <spatial {words}>{ends}</spatial>")
 
     def pose(self, frame: str) -> tuple[str, Array]:
         """Return the link of the body that carries a frame, and the frame's pose there."""

@@ -16,12 +16,13 @@ from fivebar_pin.chain import find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.plane import plane_normal
+from fivebar_pin.springs import Spring
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain
     from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]
+__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes", "spring_ends"]
 
 _SAME = 1e-9  # distance of points that are one [of the body, and for its size at least so many m]
 _ALONG = 1e-9  # component that counts as none [-]
@@ -121,7 +122,7 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
     """Return the points (k, 3) [m] that the body of a joint connects, in its own frame, its own joint first.
 
     These are the joints it carries and its closure frames; for the last body of a branch the farthest frame
-    on it, or its mass centre when there is none.
+    on it, or its mass centre when there is none. The ends of springs on it come last.
     """
     model = chain.model
     points = [np.zeros(3)]
@@ -136,7 +137,17 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
         ends.append(np.array(model.inertias[joint].lever))
         tip = max(ends, key=lambda p: float(np.linalg.norm(p)))
         points.append(tip)
+    held = [f for s in chain.springs if isinstance(s, Spring) for f in (s.frame1, s.frame2)]
+    frames = [find_frame(model, name) for name in held]
+    points += [np.array(f.placement.translation) for f in frames if f.parentJoint == joint]
     return _distinct(np.array(points))
+
+
+def spring_ends(chain: ClosedChain, spring: Spring, joints: Array) -> tuple[Array, Array]:
+    """Return where the ends of a spring are (n, 3) each [m], from the poses of the joint frames (n, njoints, 4, 4)."""
+    frames = (find_frame(chain.model, name) for name in (spring.frame1, spring.frame2))
+    first, second = (joints[:, f.parentJoint] @ f.placement.homogeneous for f in frames)
+    return first[:, :3, 3], second[:, :3, 3]
 
 
 def _distinct(points: Array) -> Array:
