@@ -17,6 +17,8 @@ from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.mechanism.loops import Loops, inverse
 from fivebar_pin.mechanism.newton import Limits
 
+__all__ = ["HELD", "Ground", "Walk", "close", "ground"]
+
 HELD = 1e-6  # scaled smallest singular value of the passive columns where the motors still hold the mechanism [-]
 _REGULAR = 1e-3  # scaled smallest singular value of all columns where the mechanism does not branch [-]
 _LONGEST, _SHORTEST = 0.7, 1e-4  # steps of a walk [rad, or chain lengths]
