@@ -37,8 +37,18 @@ WAYS = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
 }
-INNER = ("viz", "cli", "io", "__main__", "balancing.solvers.barrier")  # rooms whose values no result holds
 ABSTRACT = (fb.Closure, fb.closures.Anchored, fb.closures.FrameClosure)  # of which no value is made
+WORKSHOPS = (
+    "walk",
+    "sampling",
+    "setting",
+    "lifting",
+    "counterweight_search",
+    "objectives.making",
+    "regressors.body_motion",
+    "solvers.barrier",
+)
+INNER = ("viz", "cli", "io", "__main__", *(f"balancing.{m}" for m in WORKSHOPS))  # whose values no result holds
 EXAMPLES = {"float": 1.5e-3, "int | None": 7, "float | None": 0.25, "Iterable[str]": ("a", "b"), "object": "motor 1"}
 
 

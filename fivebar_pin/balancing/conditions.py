@@ -20,10 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integer, skew
-from fivebar_pin.balancing._at_rest import held, required_gravity, same_springs, spring_rows, springs_act
-from fivebar_pin.balancing._parameters import Space, plane_axes
-from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
-from fivebar_pin.balancing._state import State
+from fivebar_pin.balancing.parameters import Space, plane_axes
+from fivebar_pin.balancing.regressors.body_motion import BodyMotion
+from fivebar_pin.balancing.sampling import Samples, SpaceName, random_samples, space_of
+from fivebar_pin.balancing.static import held, required_gravity, same_springs, spring_rows, springs_act
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Anchored
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
@@ -295,7 +295,7 @@ def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Arr
     for k in range(chain.na):
         v = samples.N[:, :, k]
         unit = np.abs(v / loops.column_scale).max(axis=1, keepdims=True)
-        Y = State.of(loops, samples.q, v / unit, poses=samples.poses).momentum()
+        Y = BodyMotion.of(loops, samples.q, v / unit, poses=samples.poses).momentum()
         Y = np.swapaxes(Y, 1, 2).reshape(len(samples), 6, -1)
         moment = Y[:, 3:] - np.matmul(skew(about), Y[:, :3])
         force = Y[:, :3] / space.length

@@ -12,7 +12,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin import paper
 from fivebar_pin.balancing import Ball, Box, Design, Ellipsoid, balance, balance_conditions, balance_problem
-from fivebar_pin.balancing._parameters import pseudo_inertia
+from fivebar_pin.balancing.parameters import pseudo_inertia
 from fivebar_pin.balancing.solvers import solve
 from fivebar_pin.balancing.solvers.certificate import polished
 from fivebar_pin.dynamics import inverse_dynamics

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.balancing._material import Material
-from fivebar_pin.balancing._parameters import Space, from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.balancing.design import Change, change_of
+from fivebar_pin.balancing.parameters import Space, from_pseudo_inertia, pseudo_inertia
+from fivebar_pin.balancing.variables.material import Material
 from fivebar_pin.chain import ClosedChain
 
 if TYPE_CHECKING:
     from fivebar_pin.balancing.problem import BalanceProblem
+
+__all__ = ["Lifted", "height_of", "lift", "linear", "lowest_eigenvalue"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,15 +18,17 @@ import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, frozen
 
+__all__ = ["INERTIA_PAIRS", "TEN", "Space", "from_pseudo_inertia", "inertia_matrix", "plane_axes", "pseudo_inertia"]
+
 TEN = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
-_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # order of the inertia entries
+INERTIA_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # order of the inertia entries
 _AXES = "xyz"
 
 
 def inertia_matrix(pi: Array) -> Array:
     """Return the inertia about the joint origin (..., 3, 3) of parameters (..., 10)."""
     I = np.empty((*pi.shape[:-1], 3, 3))
-    for k, (i, j) in enumerate(_PAIRS):
+    for k, (i, j) in enumerate(INERTIA_PAIRS):
         I[..., i, j] = I[..., j, i] = pi[..., 4 + k]
     return I
 
@@ -48,7 +50,7 @@ def from_pseudo_inertia(P: Array) -> Array:
     S = P[..., :3, :3]
     I = (S[..., 0, 0] + S[..., 1, 1] + S[..., 2, 2])[..., None, None] * np.eye(3) - S
     pi[..., 0], pi[..., 1:4] = P[..., 3, 3], P[..., :3, 3]
-    for k, (i, j) in enumerate(_PAIRS):
+    for k, (i, j) in enumerate(INERTIA_PAIRS):
         pi[..., 4 + k] = I[..., i, j]
     return pi
 
@@ -117,7 +119,7 @@ class Space(Immutable):
         T[0, 0] = 1.0
         T[1:3, 1:4] = self.axes[b, :2]
         n = self.axes[b, 2]
-        for k, (i, j) in enumerate(_PAIRS):
+        for k, (i, j) in enumerate(INERTIA_PAIRS):
             T[3, 4 + k] = n[i] * n[j] * (1.0 if i == j else 2.0)
         return T
 

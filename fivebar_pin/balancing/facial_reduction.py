@@ -18,9 +18,11 @@ from dataclasses import replace
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.balancing.solvers.cones import outside
+from fivebar_pin.balancing.variables.material import Material
+
+__all__ = ["empty", "without"]
 
 _ZERO = 1e-9  # coefficient of a condition that counts as none [scaled, rows of unit size]
 _ROUND_OFF = 1e-13  # what is left of a condition that says nothing any more [of its largest coefficient]

@@ -15,11 +15,13 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, frozen
-from fivebar_pin.balancing._parameters import Space, plane_axes
 from fivebar_pin.balancing.design import PROVED, Change, Design, change_of
-from fivebar_pin.balancing.pieces import ARM, Piece, Sphere, ball_radius, density_of
+from fivebar_pin.balancing.parameters import Space, plane_axes
+from fivebar_pin.balancing.pieces.piece import ARM, Piece, Sphere, ball_radius, density_of
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
+
+__all__ = ["Maker", "Size", "Sizes", "arm_of", "arm_width", "outer_radius"]
 
 _STEPS = 60  # designs tried until size and place of the pieces stay
 _SETTLED = 1e-6  # change of the objective from design to design [of its size]

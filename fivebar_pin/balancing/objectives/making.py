@@ -10,10 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, reals
-from fivebar_pin.balancing._material import Material
-from fivebar_pin.balancing._quantities import Rows, reflected_inertia
-from fivebar_pin.balancing._setup import Setup
-from fivebar_pin.balancing._terms import (
+from fivebar_pin.balancing.objectives.term import (
     LINEAR,
     Term,
     base,
@@ -24,10 +21,15 @@ from fivebar_pin.balancing._terms import (
     rows_term,
     torque_limits,
 )
+from fivebar_pin.balancing.regressors.measures import Rows, reflected_inertia
+from fivebar_pin.balancing.setting import Setup
 from fivebar_pin.balancing.solvers import Block
+from fivebar_pin.balancing.variables.material import Material
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["OVERREACH", "TermMaker", "overreach", "weights_of"]
 
 OVERREACH = "overreach"  # of counterweights that may stick out of their regions, on the way to some that do not
 _HEAVIEST = 1e30  # weight of a term: products with it do not overflow [-]

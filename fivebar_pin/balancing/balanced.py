@@ -8,16 +8,16 @@ from typing import Literal
 
 import numpy.typing as npt
 
-from fivebar_pin.balancing._objective import weights_of
-from fivebar_pin.balancing._quantities import Motions
-from fivebar_pin.balancing._sampling import SpaceName
-from fivebar_pin.balancing._setup import MassBounds
 from fivebar_pin.balancing.branches import Branch, branches, configurations_meant
 from fivebar_pin.balancing.conditions import BalanceConditions, conditions_for
 from fivebar_pin.balancing.design import Design
-from fivebar_pin.balancing.pieces import Piece
+from fivebar_pin.balancing.objectives.making import weights_of
+from fivebar_pin.balancing.pieces.piece import Piece
 from fivebar_pin.balancing.problem import balance_problem
-from fivebar_pin.balancing.regions import Region
+from fivebar_pin.balancing.regions.region import Region
+from fivebar_pin.balancing.regressors.measures import Motions
+from fivebar_pin.balancing.sampling import SpaceName
+from fivebar_pin.balancing.setting import MassBounds
 from fivebar_pin.balancing.solvers import DEFAULT
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError

@@ -12,8 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._material import Material
 from fivebar_pin.balancing.solvers import Block
+from fivebar_pin.balancing.variables.material import Material
+
+__all__ = ["extents"]
 
 _PASSES = 12  # of intervals over the rows; forms that stand on each other are fewer levels high
 _WEIGHTS = 4.0 ** np.arange(-6, 7)  # t of the pairs of a matrix

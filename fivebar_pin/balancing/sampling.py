@@ -13,8 +13,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, frozen
-from fivebar_pin.balancing._parameters import Space, plane_axes
-from fivebar_pin.balancing._walk import HELD, Ground, Walk, ground
+from fivebar_pin.balancing.parameters import Space, plane_axes
+from fivebar_pin.balancing.walk import HELD, Ground, Walk, ground
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.closing import Limits, polish, residual_of, search
@@ -22,6 +22,8 @@ from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.plane import plane_normal
 from fivebar_pin.mechanism.tree import Poses
+
+__all__ = ["Samples", "SpaceName", "closed_at", "random_samples", "space_of"]
 
 SpaceName = Literal["auto", "planar", "spatial"]
 

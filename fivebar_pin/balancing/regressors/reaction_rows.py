@@ -9,17 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_pin._arrays import Array, skew
-from fivebar_pin.balancing._state import gravity_of, state_of, torque_offset, tree_torque
+from fivebar_pin.balancing.regressors.body_motion import gravity_of, motion_of_bodies, torque_offset, tree_torque
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.elastic import body_wrenches
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.trajectory import Trajectory
 
+__all__ = ["marked", "reaction_matrices"]
 
-def reactions(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array, Array]:
+
+def reaction_matrices(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array, Array]:
     """Return joint (n, nb, 6, 10 nb + 1) and closure (n, nc, 6, 10 nb + 1) reactions; the last column is the offset."""
-    loops, state = loops_of(chain), state_of(chain, trajectory)
+    loops, state = loops_of(chain), motion_of_bodies(chain, trajectory)
     n, nb = state.p.shape[:2]
     wrench = state.wrench(gravity_of(chain))
     tau = np.concatenate([tree_torque(state, wrench), torque_offset(chain, trajectory)[..., None]], axis=2)

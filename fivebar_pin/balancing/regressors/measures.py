@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import ROUND_OFF, Array, Immutable
-from fivebar_pin.balancing._reaction_rows import reactions
 from fivebar_pin.balancing.regressors import regressor
+from fivebar_pin.balancing.regressors.reaction_rows import reaction_matrices
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.dynamics.reactions import determinate
@@ -18,6 +18,8 @@ from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.kinematics import drive
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["MEASURES", "Motions", "Rows", "measure", "reflected_inertia", "trajectories"]
 
 Motions = Motion | Trajectory | Sequence[Motion | Trajectory]
 MEASURES = (
@@ -142,7 +144,7 @@ def _one(chain: ClosedChain, path: Trajectory, name: str, about: Array) -> tuple
 
 def _bearing_rows(chain: ClosedChain, path: Trajectory) -> tuple[Array, Array]:
     """Return the determinate part of the forces in all joints and closures, three rows each."""
-    joint, closure = reactions(chain, path)
+    joint, closure = reaction_matrices(chain, path)
     forces = np.concatenate([joint, closure], axis=1)[:, :, :3]
     forces = np.matmul(determinate(inverse_dynamics(chain, path).reactions.free), forces)
     forces = forces.reshape(len(path), -1, forces.shape[-1])

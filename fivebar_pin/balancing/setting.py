@@ -8,16 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, checked
-from fivebar_pin.balancing import _lift
-from fivebar_pin.balancing._making import Sizes
-from fivebar_pin.balancing._material import Bounds, Material, material
-from fivebar_pin.balancing._parameters import Space, pseudo_inertia
+from fivebar_pin.balancing import lifting
 from fivebar_pin.balancing.conditions import BalanceConditions
-from fivebar_pin.balancing.pieces import Piece, Sphere, density_bound
-from fivebar_pin.balancing.regions import Ball, Region, resolve
+from fivebar_pin.balancing.counterweight_search import Sizes
+from fivebar_pin.balancing.parameters import Space, pseudo_inertia
+from fivebar_pin.balancing.pieces.piece import Piece, Sphere, density_bound
+from fivebar_pin.balancing.regions.region import Ball, Region, resolve
 from fivebar_pin.balancing.solvers import Block
+from fivebar_pin.balancing.variables.material import Bounds, Material, material
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
+
+__all__ = ["CAP", "MassBounds", "Setup", "unit_row"]
 
 MassBounds = tuple[float, float] | Mapping[str, tuple[float, float]] | None
 _WHOLE = 1e-9  # negative eigenvalue of a pseudo-inertia that is round-off [of its mass, at the chain's length]
@@ -58,7 +60,7 @@ class Setup(Immutable):
     def check_physical(self) -> None:
         """Raise when a present body could not exist."""
         for name, x in zip(self.chain.joints, self.present(), strict=True):
-            lowest = _lift.lowest_eigenvalue(x, planar=self.space.planar)
+            lowest = lifting.lowest_eigenvalue(x, planar=self.space.planar)
             if lowest < -1e-9 and self.mode == "add":
                 raise InvalidInputError(
                     f"inertia of body {name}",

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing._sampling import Samples
+from fivebar_pin.balancing.sampling import Samples
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.dynamics.elastic import resting_force
 from fivebar_pin.errors import InvalidInputError

@@ -22,8 +22,16 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked, cross, finite, frozen, reals
-from fivebar_pin.balancing._reaction_rows import marked, reactions
-from fivebar_pin.balancing._state import gravity_of, moved, side_by_side, state_of, torque_offset, tree_torque, turned
+from fivebar_pin.balancing.regressors.body_motion import (
+    gravity_of,
+    motion_of_bodies,
+    moved,
+    side_by_side,
+    torque_offset,
+    tree_torque,
+    turned,
+)
+from fivebar_pin.balancing.regressors.reaction_rows import marked, reaction_matrices
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
@@ -95,15 +103,15 @@ def _no_offset(matrix: Array) -> tuple[Array, Array]:
 
 def _rate(chain: ClosedChain, trajectory: Trajectory) -> Array:
     """Return the rate of momentum at the world origin (n, 6, 10 nb)."""
-    return side_by_side(state_of(chain, trajectory).wrench(np.zeros(3)))
+    return side_by_side(motion_of_bodies(chain, trajectory).wrench(np.zeros(3)))
 
 
 def _linear_momentum(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    return _no_offset(side_by_side(state_of(chain, trajectory).momentum())[:, :3])
+    return _no_offset(side_by_side(motion_of_bodies(chain, trajectory).momentum())[:, :3])
 
 
 def _angular_momentum(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    return _no_offset(moved(side_by_side(state_of(chain, trajectory).momentum()), about))
+    return _no_offset(moved(side_by_side(motion_of_bodies(chain, trajectory).momentum()), about))
 
 
 def _shaking_force(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
@@ -115,33 +123,33 @@ def _shaking_moment(chain: ClosedChain, trajectory: Trajectory, about: Array) ->
 
 
 def _frame_force(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    return _no_offset(-side_by_side(state_of(chain, trajectory).wrench(gravity_of(chain)))[:, :3])
+    return _no_offset(-side_by_side(motion_of_bodies(chain, trajectory).wrench(gravity_of(chain)))[:, :3])
 
 
 def _frame_moment(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    return _no_offset(-moved(side_by_side(state_of(chain, trajectory).wrench(gravity_of(chain))), about))
+    return _no_offset(-moved(side_by_side(motion_of_bodies(chain, trajectory).wrench(gravity_of(chain))), about))
 
 
 def _torque(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    state, NT = state_of(chain, trajectory), np.swapaxes(trajectory.N, 1, 2)
+    state, NT = motion_of_bodies(chain, trajectory), np.swapaxes(trajectory.N, 1, 2)
     offset = np.matmul(NT, torque_offset(chain, trajectory)[..., None])[..., 0]
     return np.matmul(NT, tree_torque(state, state.wrench(gravity_of(chain)))), offset
 
 
 def _gravity_torque(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    state = state_of(chain, trajectory)
+    state = motion_of_bodies(chain, trajectory)
     tau = tree_torque(state, state.weight(gravity_of(chain)))
     return _no_offset(np.matmul(np.swapaxes(trajectory.N, 1, 2), tau))
 
 
 def _kinetic_energy(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    state = state_of(chain, trajectory)
+    state = motion_of_bodies(chain, trajectory)
     twist = np.concatenate([state.u - cross(state.w, state.p), state.w], axis=-1)
     return _no_offset(side_by_side(0.5 * np.matmul(twist[..., None, :], state.momentum())))
 
 
 def _potential_energy(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    state, g = state_of(chain, trajectory), gravity_of(chain)
+    state, g = motion_of_bodies(chain, trajectory), gravity_of(chain)
     Y = np.zeros((*state.p.shape[:2], 1, 10))
     Y[..., 0, 0] = -(state.p @ g)
     Y[..., 0, 1:4] = -turned(state.R, np.broadcast_to(g, state.p.shape))
@@ -149,11 +157,11 @@ def _potential_energy(chain: ClosedChain, trajectory: Trajectory, about: Array) 
 
 
 def _joint_reactions(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    return marked(reactions(chain, trajectory)[0], inverse_dynamics(chain, trajectory).joint_reactions)
+    return marked(reaction_matrices(chain, trajectory)[0], inverse_dynamics(chain, trajectory).joint_reactions)
 
 
 def _closure_reactions(chain: ClosedChain, trajectory: Trajectory, about: Array) -> tuple[Array, Array]:
-    return marked(reactions(chain, trajectory)[1], inverse_dynamics(chain, trajectory).closure_reactions)
+    return marked(reaction_matrices(chain, trajectory)[1], inverse_dynamics(chain, trajectory).closure_reactions)
 
 
 _BUILDERS: dict[str, Callable[[ClosedChain, Trajectory, Array], tuple[Array, Array]]] = {

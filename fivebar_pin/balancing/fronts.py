@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, figures, frozen, integer
-from fivebar_pin.balancing._quantities import Motions
-from fivebar_pin.balancing._terms import check_terms
+from fivebar_pin.balancing.balanced import balance
 from fivebar_pin.balancing.design import Design
-from fivebar_pin.balancing.optimum import balance
+from fivebar_pin.balancing.objectives.term import check_terms
 from fivebar_pin.balancing.problem import BalanceProblem, balance_problem
+from fivebar_pin.balancing.regressors.measures import Motions
 from fivebar_pin.balancing.scoring import score
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, UnknownNameError

@@ -18,9 +18,20 @@ from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.trajectory import Trajectory
 
+__all__ = [
+    "BodyMotion",
+    "gravity_of",
+    "motion_of_bodies",
+    "moved",
+    "side_by_side",
+    "torque_offset",
+    "tree_torque",
+    "turned",
+]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State(Immutable):
+class BodyMotion(Immutable):
     """Motion of all bodies, world axes: R (n, nb, 3, 3), everything else (n, nb, 3) at the joint origins."""
 
     loops: Loops
@@ -33,7 +44,7 @@ class State(Immutable):
     alpha: Array
 
     @staticmethod
-    def of(loops: Loops, q: Array, v: Array, a: Array | None = None, poses: Poses | None = None) -> State:
+    def of(loops: Loops, q: Array, v: Array, a: Array | None = None, poses: Poses | None = None) -> BodyMotion:
         """Compute it from q (n, nq), v, a (n, nv); without a, the accelerations are zero (momentum only)."""
         tree = loops.tree
         poses = tree.poses(q) if poses is None else poses
@@ -42,9 +53,9 @@ class State(Immutable):
         w = V[..., 3:]
         u = V[..., :3] + cross(w, p)
         if a is None:
-            return State(loops, poses, R, p, u, w, np.zeros_like(u), np.zeros_like(u))
+            return BodyMotion(loops, poses, R, p, u, w, np.zeros_like(u), np.zeros_like(u))
         A = accelerations(tree, poses, rates, a)
-        return State(loops, poses, R, p, u, w, A[..., :3] + cross(A[..., 3:], p) + cross(w, u), A[..., 3:])
+        return BodyMotion(loops, poses, R, p, u, w, A[..., :3] + cross(A[..., 3:], p) + cross(w, u), A[..., 3:])
 
     def momentum(self) -> Array:
         """Return the momentum of each body at the world origin (n, nb, 6, 10)."""
@@ -95,9 +106,9 @@ def side_by_side(Y: Array) -> Array:
     return np.asarray(np.swapaxes(Y, 1, 2)).reshape(n, r, 10 * nb)
 
 
-def state_of(chain: ClosedChain, trajectory: Trajectory) -> State:
+def motion_of_bodies(chain: ClosedChain, trajectory: Trajectory) -> BodyMotion:
     """Return the motion of all bodies along a trajectory."""
-    return State.of(loops_of(chain), trajectory.q, trajectory.v, trajectory.a)
+    return BodyMotion.of(loops_of(chain), trajectory.q, trajectory.v, trajectory.a)
 
 
 def gravity_of(chain: ClosedChain) -> Array:
@@ -110,7 +121,7 @@ def moved(Y: Array, about: Array) -> Array:
     return np.asarray(Y[:, 3:] - np.matmul(skew(about), Y[:, :3]))
 
 
-def tree_torque(state: State, wrench: Array) -> Array:
+def tree_torque(state: BodyMotion, wrench: Array) -> Array:
     """Return S^T wrench (n, nv, 10 nb) for wrenches of the bodies (n, nb, 6, 10) at the world origin."""
     carried = np.repeat(state.loops.tree.support[1:].T, 10, axis=1)  # (nv, 10 nb)
     return np.asarray(np.matmul(np.swapaxes(state.poses.S, 1, 2), side_by_side(wrench)) * carried)

@@ -13,6 +13,8 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers import Block, svec
 
+__all__ = ["Cones", "constant"]
+
 _LIMIT = 48  # variables of one piece
 
 

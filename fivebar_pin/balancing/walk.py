@@ -18,6 +18,8 @@ from fivebar_pin.mechanism.closing import Limits
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.rank import inverse
 
+__all__ = ["HELD", "Ground", "Walk", "close", "ground"]
+
 HELD = 1e-6  # scaled smallest singular value of the passive columns where the motors still hold the mechanism [-]
 _REGULAR = 1e-3  # scaled smallest singular value of all columns where the mechanism does not branch [-]
 _LONGEST, _SHORTEST = 0.7, 1e-4  # steps of a walk [rad, or chain lengths]

@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.balancing._cones import Cones, constant
-from fivebar_pin.balancing._parameters import _PAIRS, from_pseudo_inertia, pseudo_inertia
-from fivebar_pin.balancing.pieces import Density, Solid
-from fivebar_pin.balancing.regions import Shape
+from fivebar_pin.balancing.parameters import INERTIA_PAIRS, from_pseudo_inertia, pseudo_inertia
+from fivebar_pin.balancing.pieces.piece import Density, Solid
+from fivebar_pin.balancing.regions.region import Shape
 from fivebar_pin.balancing.solvers import Block, svec
+from fivebar_pin.balancing.variables.forms import Cones, constant
+
+__all__ = ["Bounds", "Material", "material"]
 
 _SPREAD = 0.3  # of the anchor's unit mass, as a share of the region (of the chain's length without one) [-]
 _FAR = 100.0  # how far an elastic piece may stick out [of the region's least half extent]
@@ -208,7 +210,7 @@ class _Moments:
                 self.S = [[a, b], [b, self.inertia - a]]
             return
         I = np.trace(S) * np.eye(3) - S
-        entry = {(i, j): new(float(I[i, j])) for i, j in _PAIRS}
+        entry = {(i, j): new(float(I[i, j])) for i, j in INERTIA_PAIRS}
         half = 0.5 * (entry[0, 0] + entry[1, 1] + entry[2, 2])
         self.S = [[half - entry[i, i] if i == j else -entry[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
         self.inertia = half  # trace of the second moments

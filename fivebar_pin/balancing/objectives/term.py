@@ -9,9 +9,23 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, reals
-from fivebar_pin.balancing._quantities import MEASURES, Rows
+from fivebar_pin.balancing.regressors.measures import MEASURES, Rows
 from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
+
+__all__ = [
+    "LINEAR",
+    "TERMS",
+    "Term",
+    "base",
+    "check_terms",
+    "first",
+    "linear_term",
+    "measure_of",
+    "positive_limit",
+    "rows_term",
+    "torque_limits",
+]
 
 _NOWHERE = 1e-15  # share of a direction in vectors along motions that is round-off [-]
 LINEAR = ("added_mass", "inertia")

@@ -8,14 +8,16 @@ from dataclasses import dataclass, field
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.balancing._parameters import Space
-from fivebar_pin.balancing._quantities import Rows
-from fivebar_pin.balancing._setup import MassBounds
 from fivebar_pin.balancing.conditions import BalanceConditions
-from fivebar_pin.balancing.pieces import Piece
-from fivebar_pin.balancing.regions import Region
+from fivebar_pin.balancing.parameters import Space
+from fivebar_pin.balancing.pieces.piece import Piece
+from fivebar_pin.balancing.regions.region import Region
+from fivebar_pin.balancing.regressors.measures import Rows
+from fivebar_pin.balancing.setting import MassBounds
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.trajectory import Trajectory
+
+__all__ = ["Given"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
