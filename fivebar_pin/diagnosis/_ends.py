@@ -1,0 +1,201 @@
+"""Where a loop may have been cut: pairs of frames of an open tree that could be the two sides of one joint."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.chain import ClosedChain, frames_by_name
+
+__all__ = ["End", "Evidence", "Pair", "Sight", "coinciding", "ends_of", "lone_ends", "named", "point_names"]
+
+
+COINCIDE = 1e-3
+"""Distance up to which two origins count as one: files state lengths to about a thousandth [chain lengths]."""
+_ALWAYS = 1e-7
+"""Distance below which two origins are one whatever the joints do; round-off only [chain lengths]."""
+_PROBES = 3
+"""Random configurations at which origins that always coincide show it [-]."""
+_MOST_FRAMES = 600
+"""Frames above which coincidences are not looked for: every pair of them is measured [-]."""
+
+_LOOP = re.compile(r"clos(?:ed?|ing|ure)[ _-]*loop|closing|closure|loop", re.IGNORECASE)
+_LETTER = re.compile(r"(?<![A-Za-z])([AaBb])(?![A-Za-z])")
+_DIGIT = re.compile(r"(?<!\d)([12])(?!\d)")
+_WORD = re.compile(r"(first|second|parent|child|start|end)(?![A-Za-z])", re.IGNORECASE)
+_MATES = ({"a", "b"}, {"1", "2"}, {"first", "second"}, {"parent", "child"}, {"start", "end"})
+_POINT = re.compile(r"([A-KM-QS-Z]\d*|(?:pin|pivot|point|hinge)_?\d+)[_-].+")  # L and R are sides
+
+
+class Evidence(Enum):
+    """What speaks for a closure, the strongest first."""
+
+    GIVEN = "given"
+    NAMED = "named as a loop"
+    POINT = "one point named on two bodies"
+    COINCIDE = "the frames coincide"
+    HINGE = "the hinges coincide"
+    ENDS = "the only two open ends"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class End:
+    """A frame that a closure may hold.
+
+    Attributes:
+        name: of the frame.
+        joint: that carries it.
+        placement: of the frame in the joint, homogeneous (4, 4).
+        is_marker: it is a link of its own on a fixed joint, put there to name a place.
+        is_leaf: no joint hangs on its body.
+    """
+
+    name: str
+    joint: int
+    placement: Array
+    is_marker: bool
+    is_leaf: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """Two ends and why they may belong together."""
+
+    ends: tuple[End, End]
+    evidence: Evidence
+    label: str = ""
+
+
+def ends_of(chain: ClosedChain) -> dict[str, End]:
+    """Return the frames of links and moving joints by the name that closures know them by."""
+    model = chain.model
+    carries = {int(parent) for parent in list(model.parents)[1:]}
+    fixed = {k for k, f in enumerate(model.frames) if f.type == pin.FrameType.FIXED_JOINT}
+    found = {}
+    for name, frame in frames_by_name(model).items():
+        if frame.type == pin.FrameType.FIXED_JOINT:  # its link is in the same place
+            continue
+        at = np.array(frame.placement.homogeneous)
+        tip = frame.type == pin.FrameType.BODY and frame.parentFrame in fixed and frame.parentFrame != 0
+        marker = tip or frame.type == pin.FrameType.OP_FRAME
+        j = int(frame.parentJoint)
+        found[name] = End(name, j, at, marker, j not in carries)
+    return found
+
+
+def named(ends: Iterable[End]) -> Iterator[Pair]:
+    """Yield the frames whose names say that they close a loop: the same but for A and B, 1 and 2, first and second."""
+    left = [end for end in ends if _LOOP.search(end.name)]
+    left.sort(key=lambda end: not end.is_marker)  # a marker's fixed joint often has nearly its name
+    for pattern in (_LETTER, _WORD, _DIGIT):
+        sides: dict[str, dict[str, End]] = {}
+        for end in left:
+            found = list(pattern.finditer(end.name))
+            if found:
+                a, b = found[-1].span(1)
+                sides.setdefault(f"{end.name[:a]}*{end.name[b:]}".lower(), {}).setdefault(
+                    found[-1].group(1).lower(), end
+                )
+        for both in sides.values():
+            if set(both) in _MATES:
+                one, other = both.values()
+                left = [end for end in left if end not in (one, other)]
+                if one.joint != other.joint:
+                    yield Pair((one, other), Evidence.NAMED)
+
+
+def point_names(ends: Iterable[End]) -> Iterator[Pair]:
+    """Yield the markers that name one point of a drawing on two bodies, like B_coupler and B_rocker."""
+    points: dict[str, list[End]] = {}
+    for end in ends:
+        label = _POINT.fullmatch(end.name)
+        if end.is_marker and label:
+            points.setdefault(label.group(1), []).append(end)
+    for label, there in points.items():
+        if len(there) == 2 and there[0].joint != there[1].joint:
+            yield Pair((there[0], there[1]), Evidence.POINT, label)
+
+
+class Sight:
+    """The frames of a chain in the world at some configurations.
+
+    Attributes:
+        M: pose of each frame at each configuration, (frames, n, 4, 4).
+    """
+
+    def __init__(self, chain: ClosedChain, ends: Iterable[End], q: Iterable[Array]) -> None:
+        model, data = chain.model, chain.model.createData()
+        self.ends = list(ends)
+        poses = []
+        for one in q:
+            pin.forwardKinematics(model, data, np.array(one))
+            poses.append([np.array(M.homogeneous) for M in data.oMi])
+        self.M = np.array([[pose[end.joint] @ end.placement for pose in poses] for end in self.ends])
+
+    def gaps(self, k: int, others: npt.NDArray[np.intp]) -> Array:
+        """Return the distances of the origin of frame k from those of others (others, n) [m]."""
+        return np.asarray(np.linalg.norm(self.M[others, :, :3, 3] - self.M[k, :, :3, 3], axis=-1))
+
+
+def coinciding(chain: ClosedChain, ends: Iterable[End], starts: list[Array]) -> list[Pair]:
+    """Return frames of different bodies that coincide at one of the configurations, but not at every one.
+
+    Frames on bodies that carry nothing further come first: where a loop is cut, something ends.
+    """
+    ends = [end for end in ends if end.joint or end.is_marker]
+    if len(ends) > _MOST_FRAMES or len(ends) < 2:
+        return []
+    rng = np.random.default_rng(0)
+    neutral = pin.neutral(chain.model)
+    probes = [pin.integrate(chain.model, neutral, rng.uniform(-1.0, 1.0, chain.nv)) for _ in range(_PROBES)]
+    here, anywhere = Sight(chain, ends, starts), Sight(chain, ends, probes)
+    best: dict[tuple[int, int, tuple[float, ...], tuple[float, ...]], Pair] = {}
+    for k, end in enumerate(ends):
+        others = np.array([i for i in range(k + 1, len(ends)) if ends[i].joint != end.joint], dtype=np.intp)
+        if not others.size:
+            continue
+        near = here.gaps(k, others).min(axis=1) <= COINCIDE * chain.length
+        apart = anywhere.gaps(k, others).max(axis=1) > _ALWAYS * chain.length
+        for i in others[near & apart]:
+            pair = _oriented(chain, end, ends[i])
+            if pair is None:
+                continue
+            key = (*sorted((end.joint, ends[i].joint)), *sorted((_place(end), _place(ends[i]))))
+            if key not in best or _rank(pair) < _rank(best[key]):  # type: ignore[index]
+                best[key] = pair  # type: ignore[index]
+    return sorted(best.values(), key=_rank)
+
+
+def _oriented(chain: ClosedChain, one: End, other: End) -> Pair | None:
+    """Return a pair of coinciding frames, or nothing where none of the two bodies is an end."""
+    if not (one.is_leaf or other.is_leaf):
+        return None
+    origins = [not end.placement[:3, 3].any() and end.joint > 0 for end in (one, other)]
+    return Pair((one, other), Evidence.HINGE if all(origins) else Evidence.COINCIDE)
+
+
+def _place(end: End) -> tuple[float, ...]:
+    return tuple(float(x) for x in np.round(end.placement[:3, 3], 6))
+
+
+def _rank(pair: Pair) -> tuple[int, int, int]:
+    """Return a key that sorts coincidences, the most telling first."""
+    return (
+        list(Evidence).index(pair.evidence),
+        -sum(end.is_leaf for end in pair.ends),
+        -sum(end.is_marker for end in pair.ends),
+    )
+
+
+def lone_ends(ends: Iterable[End]) -> list[Pair]:
+    """Return the pairs of markers at which branches of the tree, or the ground, end: one where there are two ends."""
+    tips = [end for end in ends if end.is_marker and end.placement[:3, 3].any() and (end.is_leaf or end.joint == 0)]
+    return [Pair(pair, Evidence.ENDS) for pair in itertools.combinations(tips, 2) if pair[0].joint != pair[1].joint]
