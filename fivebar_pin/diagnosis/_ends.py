@@ -93,8 +93,7 @@ def ends_of(chain: ClosedChain) -> dict[str, End]:
 
 def named(ends: Iterable[End]) -> Iterator[Pair]:
     """Yield the frames whose names say that they close a loop: the same but for A and B, 1 and 2, first and second."""
-    left = [end for end in ends if _LOOP.search(end.name)]
-    left.sort(key=lambda end: not end.is_marker)  # a marker's fixed joint often has nearly its name
+    left = sorted((end for end in ends if _LOOP.search(end.name)), key=lambda end: _natural(end.name))
     for pattern in (_LETTER, _WORD, _DIGIT):
         sides: dict[str, dict[str, End]] = {}
         for end in left:
@@ -106,19 +105,29 @@ def named(ends: Iterable[End]) -> Iterator[Pair]:
                 )
         for both in sides.values():
             if set(both) in _MATES:
-                one, other = both.values()
+                one, other = (both[side] for side in sorted(both, key=_side))
                 left = [end for end in left if end not in (one, other)]
                 if one.joint != other.joint:
                     yield Pair((one, other), Evidence.NAMED)
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Return a key that sorts names with their numbers as numbers."""
+    return [(int(word), "") if word.isdecimal() else (-1, word) for word in re.split(r"(\d+)", name)]
+
+
+def _side(word: str) -> int:
+    """Return 0 for the side that is named first, 1 for the other."""
+    return int(word in ("b", "2", "second", "child", "end"))
 
 
 def point_names(ends: Iterable[End]) -> Iterator[Pair]:
     """Yield the markers that name one point of a drawing on two bodies, like B_coupler and B_rocker."""
     points: dict[str, list[End]] = {}
     for end in ends:
-        label = _POINT.fullmatch(end.name)
-        if end.is_marker and label:
-            points.setdefault(label.group(1), []).append(end)
+        said = _POINT.fullmatch(end.name)
+        if end.is_marker and said:
+            points.setdefault(said.group(1), []).append(end)
     for label, there in points.items():
         if len(there) == 2 and there[0].joint != there[1].joint:
             yield Pair((there[0], there[1]), Evidence.POINT, label)
@@ -169,8 +178,8 @@ def coinciding(chain: ClosedChain, ends: Iterable[End], starts: list[Array]) -> 
             if pair is None:
                 continue
             key = (*sorted((end.joint, ends[i].joint)), *sorted((_place(end), _place(ends[i]))))
-            if key not in best or _rank(pair) < _rank(best[key]):  # type: ignore[index]
-                best[key] = pair  # type: ignore[index]
+            if key not in best or _rank(pair) < _rank(best[key]):
+                best[key] = pair
     return sorted(best.values(), key=_rank)
 
 

@@ -17,9 +17,18 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array, Immutable, checked
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure, ClosureKind
-from fivebar_pin.diagnosis._ends import COINCIDE, End, Evidence, Pair, Sight, coinciding, ends_of, lone_ends
+from fivebar_pin.diagnosis._ends import (
+    COINCIDE,
+    End,
+    Evidence,
+    Pair,
+    Sight,
+    coinciding,
+    ends_of,
+    lone_ends,
+    point_names,
+)
 from fivebar_pin.diagnosis._ends import named as named_pairs
-from fivebar_pin.diagnosis._ends import point_names
 from fivebar_pin.diagnosis._posed import is_planar, pose
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -30,6 +39,9 @@ _ALIGNED = 2e-3
 """Angle up to which axes of coinciding frames count as parallel: rounding in files [rad]."""
 _MOST_JUDGED = 40
 """Candidates without a name that are closed and looked at, the most telling first; each takes a search [-]."""
+
+_STATED = (Evidence.GIVEN, Evidence.NAMED, Evidence.POINT)
+"""Evidence that an author left on purpose: such closures belong together and are looked at together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +131,7 @@ def _in_order(chain: ClosedChain, ends: dict[str, End], starts: list[Array]) -> 
     yield [*named_pairs(ends.values()), *point_names(ends.values())]
     yield coinciding(chain, ends.values(), starts)[:_MOST_JUDGED]
     alone = lone_ends(ends.values())
-    yield [pair for pair in alone if len(alone) == 1 and is_planar(chain, _joints(pair))]
+    yield alone if len(alone) == 1 and is_planar(chain, _joints(alone[0])) else []
 
 
 def _joints(pair: Pair) -> tuple[int, int]:
@@ -219,18 +231,28 @@ def _own_axis(chain: ClosedChain, pair: Pair) -> Array:
 
 
 def _choose(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array]) -> list[_Candidate]:
-    """Mark the candidates that make a well-posed mechanism: all of them at once if they do, else one after the other."""
+    """Mark the candidates that make a well-posed mechanism: all at once if they do, else one after the other."""
     if not candidates:
         return []
-    steps = max(len(c.kinds) for c in candidates)
-    if all(c.pair.evidence in (Evidence.GIVEN, Evidence.NAMED, Evidence.POINT) for c in candidates):
-        for step in range(steps):
-            closures = _named_apart(chain, [c.of_kind(c.kinds_from(step)) for c in candidates])
-            if not pose(chain, (*chain.closures, *closures), starts).problems:
-                for c, closure in zip(candidates, closures, strict=True):
-                    c.closure, c.chosen, c.reason = closure, True, _why(c)
-                return candidates
-    return _one_by_one(chain, candidates, starts)
+    if candidates[0].pair.evidence not in _STATED:
+        return _one_by_one(chain, candidates, starts)
+    poses = []
+    for step in range(max(len(c.kinds) for c in candidates)):
+        closures = _named_apart(chain, [c.of_kind(c.kinds_from(step)) for c in candidates])
+        poses.append(pose(chain, (*chain.closures, *closures), starts))
+        if not poses[-1].problems:
+            return _take(candidates, closures, {})
+    if any(posed.mobility >= 0 for posed in poses) or candidates[0].pair.evidence is Evidence.POINT:
+        return _one_by_one(chain, candidates, starts)
+    problems = {k - len(chain.closures): text for k, text in poses[0].problems.items()}
+    return _take(candidates, _named_apart(chain, [c.of_kind(c.kinds[0]) for c in candidates]), problems)
+
+
+def _take(candidates: list[_Candidate], closures: list[Closure], problems: dict[int, str]) -> list[_Candidate]:
+    """Choose all candidates; what their author has named is a loop even where the tree as read cannot close it."""
+    for k, (c, closure) in enumerate(zip(candidates, closures, strict=True)):
+        c.closure, c.chosen, c.reason = closure, True, "; ".join(filter(None, (_why(c), problems.get(k, ""))))
+    return candidates
 
 
 def _one_by_one(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array]) -> list[_Candidate]:
@@ -263,5 +285,5 @@ def _named_apart(chain: ClosedChain, closures: list[Closure]) -> list[Closure]:
 
 
 def _why(c: _Candidate) -> str:
-    where = "they meet where the tree stands" if c.meets else "the joints can bring them together"
+    where = "they meet already" if c.meets else "open as the tree stands"
     return f"{c.pair.evidence.value}; {where}"
