@@ -15,7 +15,18 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
 
-__all__ = ["End", "Evidence", "Pair", "Sight", "coinciding", "ends_of", "lone_ends", "named", "point_names"]
+__all__ = [
+    "COINCIDE",
+    "End",
+    "Evidence",
+    "Pair",
+    "Sight",
+    "coinciding_pairs",
+    "ends_of",
+    "lone_pairs",
+    "named_pairs",
+    "point_pairs",
+]
 
 
 COINCIDE = 1e-3
@@ -56,6 +67,7 @@ class End:
         placement: of the frame in the joint, homogeneous (4, 4).
         is_marker: it is a link of its own on a fixed joint, put there to name a place.
         is_leaf: no joint hangs on its body.
+        hinge: axis of the hinge that its body hangs on, in the axes of the frame, where the hinge is at the frame (3,).
     """
 
     name: str
@@ -63,6 +75,7 @@ class End:
     placement: Array
     is_marker: bool
     is_leaf: bool
+    hinge: Array | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,11 +100,22 @@ def ends_of(chain: ClosedChain) -> dict[str, End]:
         tip = frame.type == pin.FrameType.BODY and frame.parentFrame in fixed and frame.parentFrame != 0
         marker = tip or frame.type == pin.FrameType.OP_FRAME
         j = int(frame.parentJoint)
-        found[name] = End(name, j, at, marker, j not in carries)
+        found[name] = End(name, j, at, marker, j not in carries, _hinge(model, j, at))
     return found
 
 
-def named(ends: Iterable[End]) -> Iterator[Pair]:
+def _hinge(model: pin.Model, j: int, placement: Array) -> Array | None:
+    """Return the axis of a body's own hinge, in the axes of a frame of it that lies on the hinge's origin."""
+    joint = model.joints[j]
+    if not j or joint.nv != 1 or placement[:3, 3].any():
+        return None
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    axis = np.array(data.S, dtype=np.float64).reshape(6)[3:]
+    return placement[:3, :3].T @ axis if axis.any() else None
+
+
+def named_pairs(ends: Iterable[End]) -> Iterator[Pair]:
     """Yield the frames whose names say that they close a loop: the same but for A and B, 1 and 2, first and second."""
     left = sorted((end for end in ends if _LOOP.search(end.name)), key=lambda end: _natural(end.name))
     for pattern in (_LETTER, _WORD, _DIGIT):
@@ -121,7 +145,7 @@ def _side(word: str) -> int:
     return int(word in ("b", "2", "second", "child", "end"))
 
 
-def point_names(ends: Iterable[End]) -> Iterator[Pair]:
+def point_pairs(ends: Iterable[End]) -> Iterator[Pair]:
     """Yield the markers that name one point of a drawing on two bodies, like B_coupler and B_rocker."""
     points: dict[str, list[End]] = {}
     for end in ends:
@@ -154,7 +178,7 @@ class Sight:
         return np.asarray(np.linalg.norm(self.M[others, :, :3, 3] - self.M[k, :, :3, 3], axis=-1))
 
 
-def coinciding(chain: ClosedChain, ends: Iterable[End], starts: list[Array]) -> list[Pair]:
+def coinciding_pairs(chain: ClosedChain, ends: Iterable[End], starts: list[Array]) -> list[Pair]:
     """Return frames of different bodies that coincide at one of the configurations, but not at every one.
 
     Frames on bodies that carry nothing further come first: where a loop is cut, something ends.
@@ -174,8 +198,8 @@ def coinciding(chain: ClosedChain, ends: Iterable[End], starts: list[Array]) -> 
         near = here.gaps(k, others).min(axis=1) <= COINCIDE * chain.length
         apart = anywhere.gaps(k, others).max(axis=1) > _ALWAYS * chain.length
         for i in others[near & apart]:
-            pair = _oriented(chain, end, ends[i])
-            if pair is None:
+            pair = _met(end, ends[i])
+            if pair is None or _is_stack(chain.model, pair):
                 continue
             key = (*sorted((end.joint, ends[i].joint)), *sorted((_place(end), _place(ends[i]))))
             if key not in best or _rank(pair) < _rank(best[key]):
@@ -183,12 +207,21 @@ def coinciding(chain: ClosedChain, ends: Iterable[End], starts: list[Array]) -> 
     return sorted(best.values(), key=_rank)
 
 
-def _oriented(chain: ClosedChain, one: End, other: End) -> Pair | None:
-    """Return a pair of coinciding frames, or nothing where none of the two bodies is an end."""
-    if not (one.is_leaf or other.is_leaf):
+def _met(one: End, other: End) -> Pair | None:
+    """Return a pair of coinciding frames, or nothing where neither body is an end and the frames name no place."""
+    if not (one.is_leaf or other.is_leaf or (one.is_marker and other.is_marker)):
         return None
-    origins = [not end.placement[:3, 3].any() and end.joint > 0 for end in (one, other)]
-    return Pair((one, other), Evidence.HINGE if all(origins) else Evidence.COINCIDE)
+    hinges = all(end.hinge is not None for end in (one, other))
+    return Pair((one, other), Evidence.HINGE if hinges else Evidence.COINCIDE)
+
+
+def _is_stack(model: pin.Model, pair: Pair) -> bool:
+    """Whether two joints of one branch only start at one place, as the three slides of a body that moves freely."""
+    low, high = sorted(pair.ends, key=lambda end: end.joint)
+    above = high.joint
+    while above > low.joint:
+        above = int(model.parents[above])
+    return above == low.joint and not any(end.placement[:3, 3].any() for end in pair.ends)
 
 
 def _place(end: End) -> tuple[float, ...]:
@@ -204,7 +237,13 @@ def _rank(pair: Pair) -> tuple[int, int, int]:
     )
 
 
-def lone_ends(ends: Iterable[End]) -> list[Pair]:
-    """Return the pairs of markers at which branches of the tree, or the ground, end: one where there are two ends."""
-    tips = [end for end in ends if end.is_marker and end.placement[:3, 3].any() and (end.is_leaf or end.joint == 0)]
-    return [Pair(pair, Evidence.ENDS) for pair in itertools.combinations(tips, 2) if pair[0].joint != pair[1].joint]
+def lone_pairs(ends: Iterable[End]) -> list[Pair]:
+    """Return the pairs of markers at which branches of the tree end; with the ground's where one branch has some."""
+    tips: dict[tuple[int, tuple[float, ...]], End] = {}
+    for end in ends:
+        if end.is_marker and (end.is_leaf if end.joint else end.placement[:3, 3].any()):
+            tips.setdefault((end.joint, _place(end)), end)
+    branches = [end for end in tips.values() if end.joint]
+    if len({end.joint for end in branches}) < 2:
+        branches = list(tips.values())
+    return [Pair(pair, Evidence.ENDS) for pair in itertools.combinations(branches, 2) if pair[0].joint != pair[1].joint]

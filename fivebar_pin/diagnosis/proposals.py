@@ -23,12 +23,12 @@ from fivebar_pin.diagnosis._ends import (
     Evidence,
     Pair,
     Sight,
-    coinciding,
+    coinciding_pairs,
     ends_of,
-    lone_ends,
-    point_names,
+    lone_pairs,
+    named_pairs,
+    point_pairs,
 )
-from fivebar_pin.diagnosis._ends import named as named_pairs
 from fivebar_pin.diagnosis._posed import is_planar, pose
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -40,6 +40,8 @@ _ALIGNED = 2e-3
 _MOST_JUDGED = 40
 """Candidates without a name that are closed and looked at, the most telling first; each takes a search [-]."""
 
+_FEW = 2
+"""Freedoms up to which two open ends may be meant to be one joint: a loop leaves few, two arms many [-]."""
 _STATED = (Evidence.GIVEN, Evidence.NAMED, Evidence.POINT)
 """Evidence that an author left on purpose: such closures belong together and are looked at together."""
 
@@ -127,11 +129,10 @@ def _given(ends: dict[str, End], pair: tuple[str, str]) -> Pair:
 
 
 def _in_order(chain: ClosedChain, ends: dict[str, End], starts: list[Array]) -> Iterable[list[Pair]]:
-    """Yield the candidates of each kind of evidence; the next ones are asked for when none of these is chosen."""
-    yield [*named_pairs(ends.values()), *point_names(ends.values())]
-    yield coinciding(chain, ends.values(), starts)[:_MOST_JUDGED]
-    alone = lone_ends(ends.values())
-    yield alone if len(alone) == 1 and is_planar(chain, _joints(alone[0])) else []
+    """Yield the candidates by evidence; the next ones are asked for when none of these is chosen."""
+    yield [*named_pairs(ends.values()), *point_pairs(ends.values())]
+    yield coinciding_pairs(chain, ends.values(), starts)[:_MOST_JUDGED]
+    yield lone_pairs(ends.values())
 
 
 def _joints(pair: Pair) -> tuple[int, int]:
@@ -153,7 +154,7 @@ class _Candidate:
         k = int(np.argmin(gaps))
         self.gap, self.Q = float(gaps[k]), M[0, k, :3, :3].T @ M[1, k, :3, :3]
         self.meets = self.gap <= COINCIDE * chain.length
-        self.axis = _own_axis(chain, pair)
+        self.axis = _own_axis(pair)
         self.kinds = [kind] if kind is not None else self._kinds(chain)
         self.closure = self.of_kind(self.kinds[0])
 
@@ -163,7 +164,7 @@ class _Candidate:
         said = _said(self.pair)
         if said is not None:
             return [said]
-        if any(_is_pin(chain, end) for end in self.pair.ends):
+        if any(end.is_leaf and end.hinge is not None for end in self.pair.ends):  # it has its hinge already
             return [WELD, POINT]
         if is_planar(chain, _joints(self.pair)):
             return [POINT]
@@ -210,31 +211,20 @@ def _said(pair: Pair) -> ClosureKind | None:
     return None
 
 
-def _is_pin(chain: ClosedChain, end: End) -> bool:
-    """Whether the frame is where its own body hangs on a hinge and ends: the hinge of the closure is there already."""
-    joint = chain.model.joints[end.joint]
-    return end.is_leaf and joint.nv == 1 and "P" not in joint.shortname()[10:12] and not end.placement[:3, 3].any()
-
-
-def _own_axis(chain: ClosedChain, pair: Pair) -> Array:
+def _own_axis(pair: Pair) -> Array:
     """Return the axis that two hinges at these frames share, in the axes of both; z where they do not."""
-    z = np.array([0.0, 0.0, 1.0])
-    axes = []
-    for end in pair.ends:
-        joint = chain.model.joints[end.joint]
-        if not end.joint or joint.nv != 1 or end.placement[:3, 3].any():
-            return z
-        data = joint.createData()
-        joint.calc(data, pin.neutral(chain.model))
-        axes.append(end.placement[:3, :3].T @ np.array(data.S).reshape(6)[3:])
-    return axes[0] if np.array_equal(axes[0], axes[1]) and axes[0].any() else z
+    one, other = (end.hinge for end in pair.ends)
+    return one if one is not None and other is not None and np.array_equal(one, other) else np.array([0.0, 0.0, 1.0])
 
 
 def _choose(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array]) -> list[_Candidate]:
     """Mark the candidates that make a well-posed mechanism: all at once if they do, else one after the other."""
     if not candidates:
         return []
-    if candidates[0].pair.evidence not in _STATED:
+    evidence = candidates[0].pair.evidence
+    if evidence is Evidence.ENDS:
+        return _choose_the_only(chain, candidates, starts)
+    if evidence not in _STATED:
         return _one_by_one(chain, candidates, starts)
     poses = []
     for step in range(max(len(c.kinds) for c in candidates)):
@@ -242,10 +232,24 @@ def _choose(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array
         poses.append(pose(chain, (*chain.closures, *closures), starts))
         if not poses[-1].problems:
             return _take(candidates, closures, {})
-    if any(posed.mobility >= 0 for posed in poses) or candidates[0].pair.evidence is Evidence.POINT:
+    if any(posed.mobility >= 0 for posed in poses) or evidence is Evidence.POINT:
         return _one_by_one(chain, candidates, starts)
     problems = {k - len(chain.closures): text for k, text in poses[0].problems.items()}
     return _take(candidates, _named_apart(chain, [c.of_kind(c.kinds[0]) for c in candidates]), problems)
+
+
+def _choose_the_only(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array]) -> list[_Candidate]:
+    """Choose the only two open ends, if joining them makes a mechanism of few freedoms; never one pair of several."""
+    if len(candidates) > 1:
+        for c in candidates:
+            c.reason = f"one of {len(candidates)} pairs of open ends; nothing says which belong together"
+        return []
+    (c,) = candidates
+    posed = pose(chain, (*chain.closures, c.closure), starts)
+    if not posed.problems and posed.mobility > _FEW:
+        c.reason = f"the only two open ends, but {posed.mobility} freedoms would be left: two arms rather than a loop"
+        return []
+    return _one_by_one(chain, candidates, starts)
 
 
 def _take(candidates: list[_Candidate], closures: list[Closure], problems: dict[int, str]) -> list[_Candidate]:
