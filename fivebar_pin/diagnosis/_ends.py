@@ -37,6 +37,8 @@ _PROBES = 3
 """Random configurations at which origins that always coincide show it [-]."""
 _MOST_FRAMES = 600
 """Frames above which coincidences are not looked for: every pair of them is measured [-]."""
+_MOST_ENDS = 6
+"""Pairs of open ends up to which they are worth telling [-]."""
 
 _LOOP = re.compile(r"clos(?:ed?|ing|ure)[ _-]*loop|closing|closure|loop", re.IGNORECASE)
 _LETTER = re.compile(r"(?<![A-Za-z])([AaBb])(?![A-Za-z])")
@@ -211,8 +213,12 @@ def _met(one: End, other: End) -> Pair | None:
     """Return a pair of coinciding frames, or nothing where neither body is an end and the frames name no place."""
     if not (one.is_leaf or other.is_leaf or (one.is_marker and other.is_marker)):
         return None
-    hinges = all(end.hinge is not None for end in (one, other))
-    return Pair((one, other), Evidence.HINGE if hinges else Evidence.COINCIDE)
+    hinges = [end.hinge is not None for end in (one, other)]
+    if not (
+        any(hinges) or one.placement[:3, 3].any() or other.placement[:3, 3].any() or one.is_marker or other.is_marker
+    ):
+        return None  # two slides that start at one place
+    return Pair((one, other), Evidence.HINGE if all(hinges) else Evidence.COINCIDE)
 
 
 def _is_stack(model: pin.Model, pair: Pair) -> bool:
@@ -238,12 +244,11 @@ def _rank(pair: Pair) -> tuple[int, int, int]:
 
 
 def lone_pairs(ends: Iterable[End]) -> list[Pair]:
-    """Return the pairs of markers at which branches of the tree end; with the ground's where one branch has some."""
+    """Return the pairs of markers at which branches of the tree end; none where they are too many to choose from."""
     tips: dict[tuple[int, tuple[float, ...]], End] = {}
     for end in ends:
-        if end.is_marker and (end.is_leaf if end.joint else end.placement[:3, 3].any()):
+        if end.is_marker and end.is_leaf and end.joint:
             tips.setdefault((end.joint, _place(end)), end)
-    branches = [end for end in tips.values() if end.joint]
-    if len({end.joint for end in branches}) < 2:
-        branches = list(tips.values())
-    return [Pair(pair, Evidence.ENDS) for pair in itertools.combinations(branches, 2) if pair[0].joint != pair[1].joint]
+    pairs = itertools.combinations(tips.values(), 2)
+    found = [Pair(pair, Evidence.ENDS) for pair in pairs if pair[0].joint != pair[1].joint]
+    return found if len(found) <= _MOST_ENDS else []

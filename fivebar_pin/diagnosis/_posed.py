@@ -26,6 +26,8 @@ _STILL = 1e-8
 _PARALLEL = 1e-6
 """Sine of the angle up to which hinges are parallel: what rounding in a file makes of right angles [-]."""
 
+_OVER = "the loop is overconstrained: it closes only with these exact dimensions"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posed:
@@ -35,11 +37,18 @@ class Posed:
         problems: what is wrong, by the index of the closure it is about.
         q: configuration that closes them best (nq,).
         mobility: freedoms left in general; -1 when they cannot be closed.
+        gap: what the worst of them stays open by then [m or rad], else 0.
     """
 
     problems: dict[int, str]
     q: Array
     mobility: int
+    gap: float = 0.0
+
+    @property
+    def only_over(self) -> bool:
+        """Whether nothing is wrong but that some closures hold only with these exact dimensions."""
+        return self.mobility > 0 and all(text == _OVER for text in self.problems.values())
 
 
 def pose(chain: ClosedChain, closures: Iterable[Closure], starts: list[Array]) -> Posed:
@@ -50,7 +59,8 @@ def pose(chain: ClosedChain, closures: Iterable[Closure], starts: list[Array]) -
     if not found:
         gaps = _gaps(loops, q)
         worst = int(np.argmax(gaps))
-        return Posed({worst: f"the loop cannot be closed; it stays open by {gaps[worst]:.2g} m or rad"}, q, -1)
+        text = f"the loop cannot be closed; it stays open by {gaps[worst]:.2g} m or rad"
+        return Posed({worst: text}, q, -1, gaps[worst])
     site = mobility.generic_site(closed, mobility.site_at(loops, q), 0, _REACHED)
     return Posed(_problems(closed, loops, site), q, closed.nv - site.rank)
 
@@ -83,7 +93,7 @@ def _problems(chain: ClosedChain, loops: Loops, site: Site) -> dict[int, str]:
         elif loops.rank(without) == site.rank:
             out[c.index] = "it follows from the other closures: it takes no freedom away"
         elif site.rank < loops.r and _is_over(loops, site, c.rows):
-            out[c.index] = "the loop would be overconstrained: it closes only with these exact dimensions"
+            out[c.index] = _OVER
     return out
 
 

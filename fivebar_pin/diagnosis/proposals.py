@@ -29,7 +29,7 @@ from fivebar_pin.diagnosis._ends import (
     named_pairs,
     point_pairs,
 )
-from fivebar_pin.diagnosis._posed import is_planar, pose
+from fivebar_pin.diagnosis._posed import Posed, is_planar, pose
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["Evidence", "Proposal", "propose_closures"]
@@ -103,7 +103,8 @@ def propose_closures(
     given = [_given(ends, pair) for pair in pairs]
     tried: list[_Candidate] = []
     for found in [given] if given else _in_order(chain, ends, starts):
-        fresh = [_Candidate(chain, pair, starts, wanted) for pair in found if not _is_held(chain, pair)]
+        held = {frozenset(c.frames) for c in (*chain.closures, *(one.closure for one in tried))}
+        fresh = [_Candidate(chain, pair, starts, wanted) for pair in found if _names(pair) not in held]
         chosen = _choose(chain, fresh, starts)
         tried += fresh
         if chosen:
@@ -139,9 +140,8 @@ def _joints(pair: Pair) -> tuple[int, int]:
     return pair.ends[0].joint, pair.ends[1].joint
 
 
-def _is_held(chain: ClosedChain, pair: Pair) -> bool:
-    names = {pair.ends[0].name, pair.ends[1].name}
-    return any(set(closure.frames) == names for closure in chain.closures)
+def _names(pair: Pair) -> frozenset[str]:
+    return frozenset(end.name for end in pair.ends)
 
 
 class _Candidate:
@@ -226,16 +226,18 @@ def _choose(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array
         return _choose_the_only(chain, candidates, starts)
     if evidence not in _STATED:
         return _one_by_one(chain, candidates, starts)
-    poses = []
+    posed = []
     for step in range(max(len(c.kinds) for c in candidates)):
         closures = _named_apart(chain, [c.of_kind(c.kinds_from(step)) for c in candidates])
-        poses.append(pose(chain, (*chain.closures, *closures), starts))
-        if not poses[-1].problems:
-            return _take(candidates, closures, {})
-    if any(posed.mobility >= 0 for posed in poses) or evidence is Evidence.POINT:
+        posed.append((pose(chain, (*chain.closures, *closures), starts), closures))
+        if not posed[-1][0].problems:
+            return _take(chain, candidates, *posed[-1])
+    over = [one for one in posed if one[0].only_over]
+    if over:
+        return _take(chain, candidates, *over[-1])
+    if evidence is Evidence.POINT or any(one.mobility >= 0 for one, _ in posed):
         return _one_by_one(chain, candidates, starts)
-    problems = {k - len(chain.closures): text for k, text in poses[0].problems.items()}
-    return _take(candidates, _named_apart(chain, [c.of_kind(c.kinds[0]) for c in candidates]), problems)
+    return _take(chain, candidates, *min(posed, key=lambda one: one[0].gap))
 
 
 def _choose_the_only(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array]) -> list[_Candidate]:
@@ -252,10 +254,10 @@ def _choose_the_only(chain: ClosedChain, candidates: list[_Candidate], starts: l
     return _one_by_one(chain, candidates, starts)
 
 
-def _take(candidates: list[_Candidate], closures: list[Closure], problems: dict[int, str]) -> list[_Candidate]:
-    """Choose all candidates; what their author has named is a loop even where the tree as read cannot close it."""
-    for k, (c, closure) in enumerate(zip(candidates, closures, strict=True)):
-        c.closure, c.chosen, c.reason = closure, True, "; ".join(filter(None, (_why(c), problems.get(k, ""))))
+def _take(chain: ClosedChain, candidates: list[_Candidate], posed: Posed, closures: list[Closure]) -> list[_Candidate]:
+    """Choose all candidates; what an author has named is a loop even where the tree as read cannot close it."""
+    for k, (c, closure) in enumerate(zip(candidates, closures, strict=True), len(chain.closures)):
+        c.closure, c.chosen, c.reason = closure, True, "; ".join(filter(None, (_why(c), posed.problems.get(k, ""))))
     return candidates
 
 
