@@ -17,6 +17,7 @@ from fivebar_pin.chain import ClosedChain, frames_by_name
 
 __all__ = [
     "COINCIDE",
+    "NEAR",
     "End",
     "Evidence",
     "Pair",
@@ -31,6 +32,8 @@ __all__ = [
 
 COINCIDE = 1e-3
 """Distance up to which two origins count as one: files state lengths to about a thousandth [chain lengths]."""
+NEAR = 0.02
+"""Distance up to which origins that nearly meet are told of: bars side by side, not in one plane [chain lengths]."""
 _ALWAYS = 1e-7
 """Distance below which two origins are one whatever the joints do; round-off only [chain lengths]."""
 _PROBES = 3
@@ -68,6 +71,7 @@ class End:
         joint: that carries it.
         placement: of the frame in the joint, homogeneous (4, 4).
         is_marker: it is a link of its own on a fixed joint, put there to name a place.
+        is_link: it is a link of its own rather than the frame of a joint.
         is_leaf: no joint hangs on its body.
         hinge: axis of the hinge that its body hangs on, in the axes of the frame, where the hinge is at the frame (3,).
     """
@@ -76,6 +80,7 @@ class End:
     joint: int
     placement: Array
     is_marker: bool
+    is_link: bool
     is_leaf: bool
     hinge: Array | None
 
@@ -102,7 +107,8 @@ def ends_of(chain: ClosedChain) -> dict[str, End]:
         tip = frame.type == pin.FrameType.BODY and frame.parentFrame in fixed and frame.parentFrame != 0
         marker = tip or frame.type == pin.FrameType.OP_FRAME
         j = int(frame.parentJoint)
-        found[name] = End(name, j, at, marker, j not in carries, _hinge(model, j, at))
+        link = frame.type != pin.FrameType.JOINT
+        found[name] = End(name, j, at, marker, link, j not in carries, _hinge(model, j, at))
     return found
 
 
@@ -180,7 +186,9 @@ class Sight:
         return np.asarray(np.linalg.norm(self.M[others, :, :3, 3] - self.M[k, :, :3, 3], axis=-1))
 
 
-def coinciding_pairs(chain: ClosedChain, ends: Iterable[End], starts: list[Array]) -> list[Pair]:
+def coinciding_pairs(
+    chain: ClosedChain, ends: Iterable[End], starts: list[Array], *, within: float = COINCIDE
+) -> list[Pair]:
     """Return frames of different bodies that coincide at one of the configurations, but not at every one.
 
     Frames on bodies that carry nothing further come first: where a loop is cut, something ends.
@@ -197,7 +205,7 @@ def coinciding_pairs(chain: ClosedChain, ends: Iterable[End], starts: list[Array
         others = np.array([i for i in range(k + 1, len(ends)) if ends[i].joint != end.joint], dtype=np.intp)
         if not others.size:
             continue
-        near = here.gaps(k, others).min(axis=1) <= COINCIDE * chain.length
+        near = here.gaps(k, others).min(axis=1) <= within * chain.length
         apart = anywhere.gaps(k, others).max(axis=1) > _ALWAYS * chain.length
         for i in others[near & apart]:
             pair = _met(end, ends[i])
@@ -234,12 +242,13 @@ def _place(end: End) -> tuple[float, ...]:
     return tuple(float(x) for x in np.round(end.placement[:3, 3], 6))
 
 
-def _rank(pair: Pair) -> tuple[int, int, int]:
+def _rank(pair: Pair) -> tuple[int, int, int, int]:
     """Return a key that sorts coincidences, the most telling first."""
     return (
         list(Evidence).index(pair.evidence),
         -sum(end.is_leaf for end in pair.ends),
         -sum(end.is_marker for end in pair.ends),
+        -sum(end.is_link for end in pair.ends),
     )
 
 

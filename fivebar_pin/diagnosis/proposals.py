@@ -19,6 +19,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.diagnosis._ends import (
     COINCIDE,
+    NEAR,
     End,
     Evidence,
     Pair,
@@ -134,6 +135,7 @@ def _in_order(chain: ClosedChain, ends: dict[str, End], starts: list[Array]) -> 
     yield [*named_pairs(ends.values()), *point_pairs(ends.values())]
     yield coinciding_pairs(chain, ends.values(), starts)[:_MOST_JUDGED]
     yield lone_pairs(ends.values())
+    yield coinciding_pairs(chain, ends.values(), starts, within=NEAR)[:_MOST_JUDGED]
 
 
 def _joints(pair: Pair) -> tuple[int, int]:
@@ -177,6 +179,11 @@ class _Candidate:
         if not self.meets and halves and self.pair.evidence is Evidence.NAMED:
             return [WELD, POINT]
         return [POINT]
+
+    @property
+    def places(self) -> set[tuple[float, ...]]:
+        """Where its ends are on their bodies."""
+        return {(end.joint, *end.placement[:3, 3].tolist()) for end in self.pair.ends}
 
     @property
     def angle(self) -> float:
@@ -224,6 +231,12 @@ def _choose(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array
     evidence = candidates[0].pair.evidence
     if evidence is Evidence.ENDS:
         return _choose_the_only(chain, candidates, starts)
+    if not candidates[0].meets and evidence not in _STATED:
+        for c in candidates:
+            c.reason = (
+                f"they come within {c.gap:.2g} m only; move a frame, or state the pair if the joints can close it"
+            )
+        return []
     if evidence not in _STATED:
         return _one_by_one(chain, candidates, starts)
     posed = []
@@ -262,8 +275,13 @@ def _take(chain: ClosedChain, candidates: list[_Candidate], posed: Posed, closur
 
 
 def _one_by_one(chain: ClosedChain, candidates: list[_Candidate], starts: list[Array]) -> list[_Candidate]:
-    base, chosen = chain, []
+    base = chain
+    chosen: list[_Candidate] = []
     for c in candidates:
+        spent = {end for other in chosen for end in other.places} & c.places
+        if spent and c.pair.evidence not in _STATED:
+            c.reason = "one of its ends is joined already"
+            continue
         for kind in c.kinds:
             (closure,) = _named_apart(base, [c.of_kind(kind)])
             posed = pose(base, (*base.closures, closure), starts)
