@@ -120,8 +120,8 @@ def _closures_table(console: Console, chain: ClosedChain, proposals: Sequence[Pr
 def _nothing(chain: ClosedChain, proposals: Sequence[Proposal]) -> InvalidInputError:
     rule = (
         "shows no loop: frames named for one (closedloop1_A and closedloop1_B), one point named on two bodies "
-        "(B_coupler and B_rocker), frames or hinges that coincide where a branch ends, and a plane's only two open "
-        "ends were looked for" + (f"; the {len(proposals)} found would make no mechanism" if proposals else "")
+        "(B_coupler and B_rocker), frames or hinges that coincide where a branch ends, and the only two open ends "
+        "were looked for" + (f"; the {len(proposals)} found would make no mechanism" if proposals else "")
     )
     return InvalidInputError("tree", chain.name, rule, f"{_BY_HAND[0].upper()}{_BY_HAND[1:]}.")
 
