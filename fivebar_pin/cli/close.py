@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fivebar_pin.diagnosis import Diagnosis, Proposal
-    from fivebar_pin.io._sidecar import Sidecar
 
 _MOST_LEFT = 12
 """Candidates that were not chosen of which the reason is printed [-]."""
@@ -55,9 +54,11 @@ def run(chosen: argparse.Namespace) -> int:
     """Propose, print and write."""
     from fivebar_pin import io
     from fivebar_pin.diagnosis import diagnose, propose_closures, propose_motors
+    from fivebar_pin.io._load import sidecar_file
 
     urdf = _urdf(chosen.path)
-    file = as_path(chosen.out) if chosen.out is not None else _sidecar_of(urdf)
+    there = sidecar_file(urdf)
+    file = as_path(chosen.out) if chosen.out is not None else there or urdf.with_suffix(".yaml")
     if not chosen.dry_run:
         check_new(file, overwrite=chosen.overwrite)
     chain = io.load(urdf, closures=(), actuated=())
@@ -76,27 +77,19 @@ def run(chosen: argparse.Namespace) -> int:
     if not diagnosis.ok:
         _tell_of_balls(console, chain)
     if not chosen.dry_run:
-        _tables.written(console, (_write(file, urdf, closed, diagnosis, overwrite=chosen.overwrite),))
+        text = _text(there, closed, diagnosis)
+        _tables.written(console, (write_file(file, text, overwrite=chosen.overwrite),))
     return 0 if diagnosis.ok else 1
 
 
 def _urdf(path: str) -> Path:
     """Return the URDF file that is meant."""
-    given = as_path(path)
-    if given.is_dir():
-        inside = sorted(given.glob("*.urdf"))
-        if len(inside) != 1:
-            raise FileFormatError(given, f"holds {len(inside)} .urdf files; name the one to close")
-        return inside[0]
-    if given.suffix.lower() != ".urdf":
-        raise FileFormatError(given, "is no .urdf file; a sidecar closes the loops of a URDF only")
-    return given
+    from fivebar_pin.io._load import mechanism_file
 
-
-def _sidecar_of(urdf: Path) -> Path:
-    """Return the sidecar that belongs to a URDF, there or not."""
-    other = urdf.with_suffix(".yml")
-    return other if other.is_file() else urdf.with_suffix(".yaml")
+    file = mechanism_file(as_path(path))
+    if file.suffix.lower() != ".urdf":
+        raise FileFormatError(file, "is no .urdf file; a sidecar closes the loops of a URDF only")
+    return file
 
 
 def _closures_table(console: Console, chain: ClosedChain, proposals: Sequence[Proposal]) -> None:
@@ -144,14 +137,13 @@ def _tell_of_balls(console: Console, chain: ClosedChain) -> None:
         console.print(f"{text}; joint_name and joint_type in a sidecar make SPHERICAL ones of them", soft_wrap=True)
 
 
-def _write(file: Path, urdf: Path, chain: ClosedChain, diagnosis: Diagnosis, *, overwrite: bool) -> Path:
-    """Write the sidecar: closures, motors, a closed configuration, and what a sidecar there said besides."""
+def _text(there: Path | None, chain: ClosedChain, diagnosis: Diagnosis) -> str:
+    """Return the sidecar: closures, motors, a closed configuration, and what the one there says besides."""
     from fivebar_pin.io._sidecar import Sidecar, dump_sidecar, read_sidecar
 
-    there = _sidecar_of(urdf)
-    old: Sidecar = read_sidecar(there) if there.is_file() else Sidecar()
+    old = Sidecar() if there is None else read_sidecar(there)
     configurations = dict(old.configurations)
     if diagnosis.gap < _CLOSED and not configurations:
         configurations["closed"] = [float(x) for x in np.array(diagnosis.q)]
     new = replace(old, closures=chain.closures, actuated=chain.actuated, configurations=configurations)
-    return write_file(file, dump_sidecar(new), overwrite=overwrite)
+    return dump_sidecar(new)
