@@ -199,6 +199,8 @@ def specimens() -> tuple[object, ...]:
         paper.audit_table_1(),
         paper.errata(),
         loads.reactions,
+        fb.diagnosis.propose_closures(fb.ClosedChain(five.model, (), ())),
+        fb.diagnosis.propose_motors(five),
     )
     return (
         *(chain, motion, trajectory, loads, free, energy, linkage, five, solution, problem, design, none, front, score),

@@ -54,7 +54,7 @@ def load(
             has this name.
     """
     where = _named(as_path(path))
-    file = _mechanism_file(where)
+    file = mechanism_file(where)
     given_closures = None if closures is None else _closures(closures)
     given_actuated = None if actuated is None else _names(actuated)
     if file.suffix.lower() == ".xml":
@@ -98,7 +98,7 @@ def _named(path: Path) -> Path:
     return shipped_path(path.name)
 
 
-def _mechanism_file(path: Path) -> Path:
+def mechanism_file(path: Path) -> Path:
     """Return the URDF or MJCF file that `path` means."""
     try:
         is_folder, exists = path.is_dir(), path.exists()
@@ -128,7 +128,8 @@ def _in_folder(folder: Path, endings: tuple[str, ...]) -> list[Path]:
         raise FileFormatError(folder, f"cannot be listed ({error.strerror or error})") from error
 
 
-def _sidecar_file(urdf: Path) -> Path | None:
+def sidecar_file(urdf: Path) -> Path | None:
+    """Return the sidecar that is read with a URDF: of the same name, or the only one of a folder with one URDF."""
     beside = _in_folder(urdf.parent, (".yaml", ".yml"))
     same = [f for f in beside if f.stem == urdf.stem]
     if len(same) > 1:
@@ -147,7 +148,7 @@ def _load_urdf(
     max_bytes: int,
 ) -> ClosedChain:
     tree = read_urdf(urdf, max_bytes=max_bytes)
-    beside = _sidecar_file(urdf)
+    beside = sidecar_file(urdf)
     if beside is None and (closures is None or actuated is None):
         raise FileFormatError(
             urdf,
