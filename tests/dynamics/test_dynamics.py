@@ -508,3 +508,22 @@ def test_arguments_are_checked():
     for wrong in (np.zeros(5), np.full(6, np.inf), ["a"] * 6):
         with pytest.raises(InvalidInputError, match=r"external\['tip_left'\]"):
             fb.inverse_dynamics(chain, trajectory, external={"tip_left": wrong})
+
+
+@pytest.mark.parametrize("sense", [-1.0, 0.0, 1.0])
+def test_dry_friction_is_against_the_motion_and_nothing_at_rest(sense):
+    """f sign(v) in both directions of dynamics: a joint at rest is not pushed."""
+    chain, q = four_bar(), fb.assemble(four_bar(), [0.9])
+    model = chain.model.copy()
+    model.upperDryFrictionLimit = np.array([0.3, 0.5, 0.7])
+    rough = fb.ClosedChain(model, chain.closures, chain.actuated)
+    motion = Motion([0.0], [[0.9]], [[2.0 * sense]], [[1.0]])
+    smooth = fb.inverse_dynamics(chain, fb.drive(chain, motion, q))
+    loads = fb.inverse_dynamics(rough, fb.drive(rough, motion, q))
+    v, N = loads.trajectory.v[0], loads.trajectory.N[0, :, 0]
+    taken = np.array([0.3, 0.5, 0.7]) @ (np.sign(v) * N)
+    assert (np.abs(v) > 0.1).all() == (sense != 0.0)
+    np.testing.assert_allclose(loads.torque - smooth.torque, [[taken]], rtol=0.0, atol=1e-13)
+    tau = smooth.torque[0]
+    plain, held = fb.forward_dynamics(chain, q, v, tau), fb.forward_dynamics(rough, q, v, tau + taken)
+    np.testing.assert_allclose(held, plain, rtol=0.0, atol=1e-10)

@@ -142,3 +142,18 @@ def test_springs_of_inverse_dynamics_are_checked():
         fb.inverse_dynamics(chain, moved, springs=[Spring("hok", "left_body", 1.0, 0.1)])
     with pytest.raises(InvalidInputError, match="must hold Spring and JointSpring objects"):
         fb.inverse_dynamics(chain, moved, springs=["hook"])
+
+
+@pytest.mark.parametrize("turn", [-2.0 * np.pi, 0.0, 2.0 * np.pi, 6.0 * np.pi])
+@pytest.mark.parametrize("away", [-3.0, -0.2, 0.5, 3.0])
+def test_a_spring_on_a_continuous_joint_takes_the_short_way_round(turn, away):
+    """tau = k x and E = k x^2 / 2 with the deflection x within half a turn, however the rest is counted."""
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    hinge = model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "hinge")
+    model.appendBodyToJoint(hinge, body(1), pin.SE3.Identity())
+    chain = fb.ClosedChain(model, (), ("hinge",))
+    moved = fb.drive(chain, laws.constant(np.array([0.0]), 2.5 + away))
+    loads = fb.inverse_dynamics(chain, moved, springs=[JointSpring("hinge", 3.0, 2.5 + turn)])
+    np.testing.assert_allclose(loads.torque, [[3.0 * away]], rtol=1e-13)
+    np.testing.assert_allclose(loads.elastic_energy, [1.5 * away**2], rtol=1e-13)

@@ -17,6 +17,7 @@ from mechanisms import (
     parallelogram,
     rscr,
     rssr,
+    side_by_side,
     slider_crank,
     spherical_four_bar,
     welded_four_bar,
@@ -25,7 +26,7 @@ from mechanisms import (
 import fivebar_pin as fb
 from fivebar_pin import Motion, paper
 from fivebar_pin import motion as laws
-from fivebar_pin.errors import AssemblyError, BranchError, InvalidInputError, SingularityError
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.mechanism.loops import loops_of
 
 
@@ -472,5 +473,23 @@ def test_one_sample_is_enough():
     assert (len(trajectory), trajectory.q.shape, trajectory.N.shape) == (1, (1, 4), (1, 4, 2))
 
 
-def test_branch_errors_are_assembly_errors():
-    assert issubclass(BranchError, AssemblyError)
+PARALLELOGRAM, CRANK_ROCKER = (0.5, 1.0, 0.5, 1.0), (0.4, 1.1, 0.9, 1.0)
+
+
+@pytest.mark.parametrize("lengths", [(PARALLELOGRAM, CRANK_ROCKER), (CRANK_ROCKER, PARALLELOGRAM)])
+def test_one_loop_at_its_singularity_is_enough_whichever_it_is(lengths):
+    """Loops that share no joint are inverted one by one; the worst of them decides."""
+    chain = side_by_side(*lengths)
+    flat = lengths.index(PARALLELOGRAM)
+    q = np.zeros(6)
+    other = 3 * (1 - flat)
+    q[other : other + 3] = fb.assemble(four_bar(CRANK_ROCKER), [0.8])
+    assert np.abs(fb.closure_residual(chain, q)).max() <= 1e-12
+    with pytest.raises(SingularityError, match="type 2 singularity") as info:
+        fb.complement(chain, q)
+    assert info.value.sigma < 1e-7
+    upright = fb.assembly_modes(parallelogram(), [0.8])[0]
+    q[3 * flat : 3 * flat + 3] = upright
+    N = fb.complement(chain, q)
+    np.testing.assert_allclose(N[3 * flat : 3 * flat + 3, flat], fb.complement(parallelogram(), upright)[:, 0])
+    assert not N[3 * flat : 3 * flat + 3, 1 - flat].any()
