@@ -25,7 +25,7 @@ from mechanisms import (
 import fivebar_pin as fb
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.closures.closure import log3
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import Loops, loops_of
 
 KINDS = ("3d", "6d", "revolute")
@@ -228,3 +228,36 @@ def test_closures_accept_the_words_of_a_sidecar_in_any_case_and_normalise_the_ax
     assert closure.name == "a~b"
     np.testing.assert_allclose(closure.axis, [0.0, 0.6, 0.8], rtol=0.0, atol=1e-15)
     assert not closure.axis.flags.writeable  # type: ignore[union-attr]
+
+
+def hinged_arms(count: int) -> fb.ClosedChain:
+    """Return arms on the ground, each closed to it by a hinge that is met at 0 and, back to front, at half a turn."""
+    model = pin.Model()
+    closures = []
+    for k in range(count):
+        arm = add(model, 0, pin.JointModelRX(), at(float(k)), f"arm{k}", body())
+        names = (point(model, 0, f"ground{k}", at(float(k))), point(model, arm, f"moving{k}", at()))
+        closures.append(fb.Closure(names, "revolute", name=f"hinge{k}"))
+    return fb.ClosedChain(model, tuple(closures), ())
+
+
+@pytest.mark.parametrize("turned", [(), (0,), (1,), (0, 1)])
+def test_one_hinge_back_to_front_is_enough_whichever_it_is(turned):
+    chain = hinged_arms(2)
+    q = np.array([np.pi if k in turned else 0.0 for k in range(2)])
+    assert np.abs(fb.closure_residual(chain, q)).max() < 1e-15
+    said = any("back to front" in p.text for p in fb.diagnose(chain, q).problems)
+    assert said == bool(turned)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.4, 2.9, -2.9])
+def test_no_search_ends_with_a_hinge_back_to_front(start):
+    chain = hinged_arms(1)
+    try:
+        q = fb.assemble(chain, [], [start])
+    except AssemblyError:
+        assert abs(start) > 2.0, "the hinge closes near by"
+    else:
+        assert np.cos(q[0]) > 0.999
+    modes = fb.assembly_modes(chain, [])
+    np.testing.assert_allclose(np.cos(modes), [[1.0]], rtol=0.0, atol=1e-12)

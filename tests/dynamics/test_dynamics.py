@@ -527,3 +527,49 @@ def test_dry_friction_is_against_the_motion_and_nothing_at_rest(sense):
     tau = smooth.torque[0]
     plain, held = fb.forward_dynamics(chain, q, v, tau), fb.forward_dynamics(rough, q, v, tau + taken)
     np.testing.assert_allclose(held, plain, rtol=0.0, atol=1e-10)
+
+
+def test_what_the_frame_carries_beside_shaking_is_told_where_there_is_any():
+    """Weight needs mass and gravity; a force from outside needs neither."""
+    chain = four_bar().with_gravity([0.0, -9.81, 0.0])
+    moved = fb.drive(chain, swinging(0.9))
+    floating, massless = chain.with_gravity(np.zeros(3)), chain.with_inertial_parameters(np.zeros((3, 10)))
+    push = {"rocker_end": np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])}
+    loaded = [fb.inverse_dynamics(c, moved).loaded for c in (chain, floating, massless)]
+    assert loaded == [True, False, False]
+    assert fb.inverse_dynamics(floating, moved, external=push).loaded
+    assert not fb.inverse_dynamics(floating, moved, external={"rocker_end": np.zeros(6)}).loaded
+    assert "frame_moment" in repr(fb.inverse_dynamics(floating, moved, external=push))
+    assert "frame_moment" not in repr(fb.inverse_dynamics(floating, moved))
+
+
+def alone(what: str) -> fb.Loads:
+    """Return the loads of a four-bar on which one thing acts and nothing else, at rest but for losses."""
+    model = four_bar().model.copy()
+    model.gravity.linear = np.array([0.0, -9.81, 0.0]) if what == "weight" else np.zeros(3)
+    if what == "friction":
+        model.upperDryFrictionLimit = np.array([0.3, 0.5, 0.7])
+    if what == "damping":
+        model.damping = np.array([0.3, 0.5, 0.7])
+    if what == "armature":
+        model.armature = np.array([0.3, 0.5, 0.7])
+    chain = fb.ClosedChain(model, four_bar().closures, ("crank",))
+    if what != "weight":
+        chain = chain.with_inertial_parameters(np.zeros((3, 10)))
+    moving = float(what in ("friction", "damping"))
+    motion = Motion([0.0], [[0.9]], [[moving]], [[float(what == "armature")]])
+    push = {"rocker_end": np.array([1.0, -2.0, 0.0, 0.0, 0.0, 0.4])} if what == "push" else {}
+    springs = [fb.JointSpring("coupler", 5.0, 0.0)] if what == "spring" else []
+    return fb.inverse_dynamics(chain, fb.drive(chain, motion), about=(0.2, -0.4, 0.3), external=push, springs=springs)
+
+
+@pytest.mark.parametrize("what", ["weight", "push", "spring", "friction", "damping", "armature"])
+def test_the_scale_of_a_load_counts_each_thing_that_acts_alone(what):
+    """With one thing acting the sum of sizes is no less than what it causes: nothing that acts is left out."""
+    x = alone(what)
+    assert x.peak("torque") > 0.1
+    for name in ("torque", "shaking_force", "shaking_moment", "frame_force", "frame_moment"):
+        assert x.scale(name) >= x.peak(name) * (1.0 - 1e-12), name
+    felt = x.peak("frame_force") > 0.1, x.peak("frame_moment") > 0.1
+    assert felt == ((True, True) if what in ("weight", "push") else (False, False))
+    assert x.peak("shaking_force") == x.peak("shaking_moment") == 0.0
