@@ -247,3 +247,15 @@ def test_a_mesh_may_be_mirrored_but_not_flattened() -> None:
     assert fb.Visual("link", "mesh", (1.0, -1.0, 1.0), mesh="a.stl").size[1] == -1.0
     with pytest.raises(InvalidInputError, match="must be scales other than zero"):
         fb.Visual("link", "mesh", (1.0, 0.0, 1.0), mesh="a.stl")
+
+
+@pytest.mark.parametrize("axis", [(1e-10, 0.0, 0.0), (0.0, -1e-200, 0.0)])
+def test_an_axis_of_next_to_nothing_is_none(axis):
+    with pytest.raises(InvalidInputError, match="closure axis .* must not be zero"):
+        fb.Closure(("a", "b"), "revolute", axis)
+
+
+@pytest.mark.parametrize("size", [1e-8, 1.0, 1e200])
+def test_the_size_of_an_axis_does_not_matter(size):
+    axis = fb.Closure(("a", "b"), "revolute", np.array([3.0, 0.0, -4.0]) * size).axis
+    np.testing.assert_allclose(axis, [0.6, 0.0, -0.8], rtol=0.0, atol=1e-15)

@@ -261,3 +261,26 @@ def test_no_search_ends_with_a_hinge_back_to_front(start):
         assert np.cos(q[0]) > 0.999
     modes = fb.assembly_modes(chain, [])
     np.testing.assert_allclose(np.cos(modes), [[1.0]], rtol=0.0, atol=1e-12)
+
+
+def test_a_diagnosis_looks_beyond_a_neutral_configuration_that_is_back_to_front():
+    """At zero the arm lies on its hinge the wrong way round; the right way is half a turn off."""
+    model = pin.Model()
+    arm = add(model, 0, pin.JointModelRX(), at(), "arm", body())
+    names = (point(model, 0, "ground", at()), point(model, arm, "moving", at(rpy=(np.pi, 0.0, 0.0))))
+    found = fb.diagnose(fb.ClosedChain(model, (fb.Closure(names, "revolute"),), ()))
+    assert not any("back to front" in p.text for p in found.problems)
+    np.testing.assert_allclose(np.cos(found.q), [-1.0], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [1e-5, 5e-4, 9e-4, 1.1e-3])
+def test_jacobian_of_a_weld_is_the_derivative_of_its_residual_where_it_is_nearly_closed(angle):
+    """The rotation rows are nearly linear there; what is left of the second order still counts."""
+    model = pin.Model()
+    arm = add(model, 0, pin.JointModelSpherical(), at(), "arm", body())
+    names = (point(model, 0, "ground", at(rpy=(0.3, -0.2, 0.5))), point(model, arm, "moving", at(rpy=(0.3, -0.2, 0.5))))
+    loops = loops_of(fb.ClosedChain(model, (fb.Closure(names, "6d"),), ()))
+    turn = angle * np.array([0.6, 0.0, 0.8])
+    q, v = pin.Quaternion(pin.exp3(turn)).coeffs()[None], np.array([[-0.7, 0.9, 0.4]])
+    rate = central(lambda h: residual(loops, loops.tree.integrate(q, h * v)), h=1e-4)
+    np.testing.assert_allclose(jacobian(loops, q)[0] @ v[0], rate[0], rtol=0.0, atol=3e-11)

@@ -573,3 +573,28 @@ def test_the_scale_of_a_load_counts_each_thing_that_acts_alone(what):
     felt = x.peak("frame_force") > 0.1, x.peak("frame_moment") > 0.1
     assert felt == ((True, True) if what in ("weight", "push") else (False, False))
     assert x.peak("shaking_force") == x.peak("shaking_moment") == 0.0
+
+
+@pytest.mark.parametrize("tilt", [1e-6, 1e-3, 0.1])
+def test_what_a_slight_tilt_leaves_open_is_open(tilt):
+    """The force across the plane is not determinate: in world axes its share makes another component so, however small.
+
+    In the joint's own axes both components in the plane stay known.
+    """
+    chain = four_bar(base=pin.SE3(pin.rpy.rpyToMatrix(tilt, 0.0, 0.0), np.zeros(3)))
+    loads = fb.inverse_dynamics(chain, fb.drive(chain, swinging(0.9)))
+    known = np.isfinite(loads.joint_reactions[0, :, :3])
+    np.testing.assert_array_equal(known, np.tile([True, False, False], (3, 1)))
+    known = np.isfinite(loads.joint_reactions_local[0, :, :3])
+    np.testing.assert_array_equal(known, np.tile([True, True, False], (3, 1)))
+
+
+def test_torques_that_no_closure_forces_explain_show_as_a_mismatch():
+    """With a complement that is none, what the closures carry does not balance the joints."""
+    chain = five_bar()
+    moved = fb.drive(chain, swinging(2.0, 1.0))
+    right = fb.inverse_dynamics(chain, moved)
+    wrong = fb.inverse_dynamics(chain, replace(moved, N=1.1 * moved.N))
+    size = np.abs(right.torque).max()
+    assert right.reactions.mismatch < 1e-12 * size
+    assert wrong.reactions.mismatch > 1e-2 * size

@@ -12,7 +12,7 @@ from mechanisms import TILTED, body, five_bar, point, rssr, slider_crank
 import fivebar_pin as fb
 from fivebar_pin import JointSpring, Motion, Spring
 from fivebar_pin import motion as laws
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
 
 def anchored(chain: fb.ClosedChain) -> fb.ClosedChain:
@@ -157,3 +157,23 @@ def test_a_spring_on_a_continuous_joint_takes_the_short_way_round(turn, away):
     loads = fb.inverse_dynamics(chain, moved, springs=[JointSpring("hinge", 3.0, 2.5 + turn)])
     np.testing.assert_allclose(loads.torque, [[3.0 * away]], rtol=1e-13)
     np.testing.assert_allclose(loads.elastic_energy, [1.5 * away**2], rtol=1e-13)
+
+
+def test_a_spring_without_length_may_have_its_ends_on_one_point_unless_it_is_damped():
+    """Its force k d needs no direction; that of a damper does."""
+    chain = five_bar()
+    moved = fb.drive(chain, swinging(2.0, 1.0))
+    bare = fb.inverse_dynamics(chain, moved)
+    met = fb.inverse_dynamics(chain, moved, springs=[Spring("tip_left", "tip_right", 50.0, 0.0)])
+    np.testing.assert_allclose(met.torque, bare.torque, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(met.elastic_energy, 0.0, rtol=0.0, atol=1e-20)
+    for ends in ({"length": 0.1}, {"length": 0.0, "damping": 2.0}):
+        with pytest.raises(SolverError, match="has its ends on one point"):
+            fb.inverse_dynamics(chain, moved, springs=[Spring("tip_left", "tip_right", 50.0, **ends)])
+
+
+def test_a_spring_on_a_joint_of_several_freedoms_is_refused():
+    chain = rssr(ball=True)
+    q = np.r_[0.3, pin.Quaternion(pin.rpy.rpyToMatrix(0.2, 0.3, 0.4)).coeffs(), 0.5]
+    with pytest.raises(InvalidInputError, match="spring on joint coupler = 'nv = 3' but needs one degree of freedom"):
+        fb.forward_dynamics(chain, q, np.zeros(5), springs=[JointSpring("coupler", 1.0, 0.0)])
