@@ -177,3 +177,18 @@ def test_a_spring_on_a_joint_of_several_freedoms_is_refused():
     q = np.r_[0.3, pin.Quaternion(pin.rpy.rpyToMatrix(0.2, 0.3, 0.4)).coeffs(), 0.5]
     with pytest.raises(InvalidInputError, match="spring on joint coupler = 'nv = 3' but needs one degree of freedom"):
         fb.forward_dynamics(chain, q, np.zeros(5), springs=[JointSpring("coupler", 1.0, 0.0)])
+
+
+def test_the_power_of_a_damper_is_its_coefficient_times_the_square_of_its_rate():
+    """A slide pulls a damper of 3 N s/m in line with it at 2 m/s, a joint damper of 5 N s/m beside it."""
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    slide = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(slide, body(1), pin.SE3.Identity())
+    point(model, slide, "end", pin.SE3.Identity())
+    chain = fb.ClosedChain(model, (), ("slide",))
+    moved = fb.drive(chain, Motion([0.0], [[0.5]], [[2.0]], [[0.0]]))
+    for damper, lost in ((Spring("universe", "end", 0.0, 0.1, 3.0), 12.0), (JointSpring("slide", 0.0, 0.0, 5.0), 20.0)):
+        account = fb.energy_balance(chain, moved, springs=[damper])
+        np.testing.assert_allclose(account.dissipated, [lost], rtol=1e-14)
+        np.testing.assert_allclose(account.stored_rate, [0.0], rtol=0.0, atol=1e-13)
