@@ -259,3 +259,28 @@ def test_an_axis_of_next_to_nothing_is_none(axis):
 def test_the_size_of_an_axis_does_not_matter(size):
     axis = fb.Closure(("a", "b"), "revolute", np.array([3.0, 0.0, -4.0]) * size).axis
     np.testing.assert_allclose(axis, [0.6, 0.0, -0.8], rtol=0.0, atol=1e-15)
+
+
+def test_frames_that_both_stand_on_the_ground_close_nothing():
+    model = arms()
+    point(model, 0, "here", at(1.0))
+    with pytest.raises(InvalidInputError, match=r"joins two frames of one body \(universe\)"):
+        fb.ClosedChain(model, (fb.Closure(("universe", "here")),), ())
+
+
+@pytest.mark.parametrize("away", [(100.0, 0.0, 0.0), (-3.0, 2.0, 5.0)])
+def test_the_length_of_a_mechanism_does_not_depend_on_where_it_stands(away):
+    assert five_bar(base=at(*away)).length == pytest.approx(five_bar().length, rel=1e-12)
+    assert double_four_bar().length == pytest.approx(9.0 / 8.0, rel=1e-12)  # eight spans; the first joint is none
+
+
+def test_a_body_without_mass_keeps_its_moments_of_inertia_and_has_no_first_moment():
+    chain = four_bar()
+    pi = np.array(chain.inertial_parameters)
+    pi[1] = [0.0, 0.0, 0.0, 0.0, 0.5, 0.01, 0.6, 0.02, 0.03, 0.7]
+    np.testing.assert_array_equal(chain.with_inertial_parameters(pi).inertial_parameters, pi)
+    for k in (1, 2, 3):
+        wrong = pi.copy()
+        wrong[1, k] = 0.1
+        with pytest.raises(InvalidInputError, match="first moment of the body of joint coupler .* must be zero"):
+            chain.with_inertial_parameters(wrong)

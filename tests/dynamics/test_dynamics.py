@@ -345,6 +345,20 @@ def test_wrench_on_the_ground_only_reaches_the_ground():
     assert loaded.momentum_residual() <= 1e-12
 
 
+def test_a_force_on_a_frame_in_the_ground_has_its_lever():
+    """The moment about the origin is p x F + M for a frame of the ground at p, in the loads and in their own check."""
+    model = slider_crank().model.copy()
+    place = np.array([0.3, -0.8, 0.4])
+    model.addFrame(pin.Frame("hook", 0, 0, pin.SE3(np.eye(3), place), pin.FrameType.OP_FRAME))
+    chain = fb.ClosedChain(model, slider_crank().closures, ("crank",))
+    trajectory, pull = fb.drive(chain, swinging(0.9)), np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
+    bare = fb.inverse_dynamics(chain, trajectory)
+    loaded = fb.inverse_dynamics(chain, trajectory, external={"hook": pull})
+    wanted = np.tile(np.cross(place, pull[:3]) + pull[3:], (40, 1))
+    np.testing.assert_allclose(loaded.frame_moment - bare.frame_moment, wanted, rtol=0.0, atol=1e-11)
+    assert loaded.momentum_residual() <= 1e-12
+
+
 def test_damping_friction_and_armature_do_what_their_names_say():
     plain, motion = five_bar(gravity=(0.0, 0.0, 0.0)), swinging(2.0, 1.0)
     trajectory = fb.drive(plain, motion)

@@ -643,5 +643,10 @@ def test_a_state_that_is_all_but_closed_is_not_closed(off):
         forward_dynamics(chain, q + off * out, v)
     with pytest.raises(InvalidInputError, match="rate of the closures at state 0"):
         forward_dynamics(chain, q, v + off * np.abs(v).max() * out)
+    batch, rates = np.stack([q, q + off * out, q]), np.stack([v, v, v + off * np.abs(v).max() * out])
+    with pytest.raises(InvalidInputError, match="closure tip at state 1"):
+        forward_dynamics(chain, batch, rates)
+    with pytest.raises(InvalidInputError, match="rate of the closures at state 2"):
+        forward_dynamics(chain, batch[[0, 0, 0]], rates)
     a = forward_dynamics(chain, q + 1e-10 * out, v * (1.0 + 1e-10))
     np.testing.assert_allclose(a, forward_dynamics(chain, q, v), rtol=1e-6)
