@@ -251,7 +251,7 @@ def test_a_mesh_may_be_mirrored_but_not_flattened() -> None:
 
 @pytest.mark.parametrize("axis", [(1e-10, 0.0, 0.0), (0.0, -1e-200, 0.0)])
 def test_an_axis_of_next_to_nothing_is_none(axis):
-    with pytest.raises(InvalidInputError, match="closure axis .* must not be zero"):
+    with pytest.raises(InvalidInputError, match=r"closure axis .* must not be zero"):
         fb.Closure(("a", "b"), "revolute", axis)
 
 
@@ -282,5 +282,5 @@ def test_a_body_without_mass_keeps_its_moments_of_inertia_and_has_no_first_momen
     for k in (1, 2, 3):
         wrong = pi.copy()
         wrong[1, k] = 0.1
-        with pytest.raises(InvalidInputError, match="first moment of the body of joint coupler .* must be zero"):
+        with pytest.raises(InvalidInputError, match=r"first moment of the body of joint coupler .* must be zero"):
             chain.with_inertial_parameters(wrong)
