@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import checked
 from fivebar_pin._files import MAX_BYTES, as_path
-from fivebar_pin.chain import ClosedChain, Visual, frames_by_name
+from fivebar_pin.chain import ClosedChain, Geometry, Visual, frames_by_name
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
@@ -167,6 +167,7 @@ def _load_urdf(
         visuals,
         urdf,
         argument=closures is not None or actuated is not None,
+        geometry=sidecar.geometry,
     )
 
 
@@ -178,10 +179,12 @@ def make_chain(
     file: Path,
     *,
     argument: bool,
+    geometry: Geometry | None = None,
 ) -> ClosedChain:
     """Return the chain; what is wrong with the file's own content is told as an error of the file."""
     try:
-        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals)
+        named = Geometry() if geometry is None else geometry
+        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, geometry=named)
     except FileFormatError:
         raise
     except FiveBarPinError as error:

@@ -2,8 +2,8 @@
 
 Keys that example-parallel-robots uses: ``closed_loop``, ``type``, ``name_mot``, ``joint_name``, ``joint_type``.
 Ours, written only when needed: ``axis`` and ``closure_name`` (one entry per closure), ``gravity``, ``joint_order``,
-``joint_data`` (per joint: armature, limits and losses of joints with several coordinates) and
-``reference_configurations``.
+``joint_data`` (per joint: armature, limits and losses of joints with several coordinates),
+``reference_configurations`` and ``parameters`` (named lengths and what follows them, see `_geometry`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from fivebar_pin._files import read_bounded
+from fivebar_pin.chain import Geometry
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
+from fivebar_pin.io._geometry import geometry_entries, read_geometry
 from fivebar_pin.io._xml import HUGE, UNLIMITED
 
 __all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "UNIVERSAL", "Sidecar", "dump_sidecar", "read_sidecar"]
@@ -49,7 +51,7 @@ DATA_WORDS = tuple(DATA_FIELDS)
 
 _KEYS = (
     "closed_loop", "type", "name_mot", "joint_name", "joint_type", "axis", "closure_name", "gravity", "joint_order",
-    "joint_data", "reference_configurations",
+    "joint_data", "reference_configurations", "parameters",
 )  # fmt: skip
 
 
@@ -64,6 +66,7 @@ class Sidecar:
     joint_order: tuple[str, ...] | None = None
     joint_data: Mapping[str, Mapping[str, list[float]]] = field(default_factory=dict)
     configurations: Mapping[str, list[float]] = field(default_factory=dict)
+    geometry: Geometry = field(default_factory=Geometry)
 
 
 def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
@@ -100,6 +103,8 @@ def dump_sidecar(sidecar: Sidecar) -> str:
         content["joint_data"] = {j: {k: _floats(v) for k, v in d.items()} for j, d in sidecar.joint_data.items()}
     if sidecar.configurations:
         content["reference_configurations"] = {k: _floats(v) for k, v in sidecar.configurations.items()}
+    if sidecar.geometry.parameters:
+        content["parameters"] = geometry_entries(sidecar.geometry)
     return "".join(
         yaml.safe_dump({key: value}, default_flow_style=True, width=10**6, allow_unicode=True).strip()[1:-1] + "\n"
         for key, value in content.items()
@@ -170,6 +175,7 @@ class _Check:
             joint_order=None if order is None else tuple(self.names("joint_order", order)),
             joint_data=self.joint_data(content.get("joint_data")),
             configurations=self.configurations(content.get("reference_configurations")),
+            geometry=read_geometry(self, content.get("parameters")),
         )
 
     def closures(self, content: dict[str, Any]) -> tuple[Closure, ...]:
