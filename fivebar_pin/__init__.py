@@ -7,8 +7,9 @@
     loads = fb.inverse_dynamics(chain, trajectory)      # torque, shaking force and moment, reactions
     design = fb.balance(chain, "force")                 # the optimal mass distribution, or the proof of none
 
-Sub-packages: `fb.paper` (the planar five-bar in closed form), `fb.balancing`, `fb.io`, `fb.viz`. Each is
-imported when it is first used, so that importing stays cheap and an interrupted command line can say so.
+Sub-packages: `fb.planar` (linkages in their own words), `fb.paper` (the planar five-bar in closed form),
+`fb.balancing`, `fb.shipped`, `fb.io`, `fb.viz`. Each is imported when it is first used, so that importing stays cheap
+and an interrupted command line can say so.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from fivebar_pin import balancing, io, motion, paper, viz
+    from fivebar_pin import balancing, io, motion, paper, planar, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure, ClosureKind
@@ -64,6 +65,7 @@ __all__ = [
     "motion",
     "paper",
     "pareto",
+    "planar",
     "save",
     "score",
     "simulate",
@@ -81,6 +83,8 @@ _LATE = {
     "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive"),
     "motion": ("Motion",),
     "paper": (),
+    "planar": (),
+    "shipped": (),
     "simulation": ("simulate",),
     "springs": ("JointSpring", "Spring"),
     "trajectory": ("Trajectory",),

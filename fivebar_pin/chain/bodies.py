@@ -114,15 +114,17 @@ class PlateBody(Body):
 
     def __post_init__(self) -> None:
         self._check(least=3)
-        for name in ("density", "thickness"):
-            self._size(name, may_be_zero=False)
-        self._size("width", may_be_zero=True)
+        self._size("thickness", may_be_zero=False)
+        for name in ("density", "width"):
+            self._size(name, may_be_zero=True)
 
     def inertia(self, poses: Array) -> pin.Inertia:
         """Return that of the polygon, by Green's theorem."""
         corners = poses[:, :3, 3]
         x, y, z = corners[:, 0], corners[:, 1], float(np.mean(corners[:, 2]))
         self._check_polygon(corners[:, :2])
+        if self.density == 0.0:
+            return pin.Inertia.Zero()
         x0, y0 = float(x.mean()), float(y.mean())
         x, y = x - x0, y - y0
         X, Y = np.roll(x, -1), np.roll(y, -1)
