@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from fivebar_pin.diagnosis import Diagnosis, diagnose
     from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics
     from fivebar_pin.errors import FiveBarPinError
-    from fivebar_pin.io import load, save
+    from fivebar_pin.io import save
     from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
     from fivebar_pin.motion import Motion
+    from fivebar_pin.planar.loading import load
     from fivebar_pin.simulation import simulate
     from fivebar_pin.springs import JointSpring, Spring
     from fivebar_pin.trajectory import Trajectory
@@ -79,11 +80,12 @@ _LATE = {
     "diagnosis": ("Diagnosis", "diagnose"),
     "dynamics": ("Loads", "energy_balance", "forward_dynamics", "inverse_dynamics"),
     "errors": ("FiveBarPinError",),
-    "io": ("load", "save"),
+    "io": ("save",),
     "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive"),
     "motion": ("Motion",),
     "paper": (),
     "planar": (),
+    "planar.loading": ("load",),
     "shipped": (),
     "simulation": ("simulate",),
     "springs": ("JointSpring", "Spring"),

@@ -20,7 +20,16 @@ from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameErro
 from fivebar_pin.io._geometry import geometry_entries, read_geometry
 from fivebar_pin.io._xml import HUGE, UNLIMITED
 
-__all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "UNIVERSAL", "Sidecar", "dump_sidecar", "read_sidecar"]
+__all__ = [
+    "DATA_FIELDS",
+    "DATA_WORDS",
+    "JOINT_WORDS",
+    "UNIVERSAL",
+    "Sidecar",
+    "dump_sidecar",
+    "plain_yaml",
+    "read_sidecar",
+]
 
 MAX_SIDECAR_BYTES = 1024 * 1024
 MAX_DEPTH = 20
@@ -75,7 +84,7 @@ def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
     Raises:
         FileFormatError: not YAML of plain values, an unknown or missing key, or a value of the wrong type.
     """
-    return _Check(path).sidecar(_plain_yaml(path, max_bytes))
+    return _Check(path).sidecar(plain_yaml(path, max_bytes))
 
 
 def dump_sidecar(sidecar: Sidecar) -> str:
@@ -115,7 +124,7 @@ def _floats(values: Any) -> list[float]:
     return [float(v) for v in values]
 
 
-def _plain_yaml(path: Path, max_bytes: int) -> object:
+def plain_yaml(path: Path, max_bytes: int) -> object:
     """Return the one document of a YAML file, without aliases, tags, doubled keys or deep nests."""
     import yaml
 

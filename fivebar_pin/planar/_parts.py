@@ -4,10 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-__all__ = ["GROUND", "Gear", "Guide", "Link", "Lump", "Motor", "PointSpring", "Section"]
+__all__ = [
+    "ALUMINIUM",
+    "GROUND",
+    "THICKNESS",
+    "WIDTH",
+    "Gear",
+    "Guide",
+    "Link",
+    "Lump",
+    "Motor",
+    "PointSpring",
+    "Section",
+]
 
 GROUND = "ground"
 """Name of the link that does not move."""
+ALUMINIUM = 2700.0
+"""Density of bars and plates unless another is given [kg/m3]."""
+WIDTH, THICKNESS = 0.02, 0.01
+"""Section of bars, and thickness of plates, unless another is given [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,3 +119,8 @@ class Motor:
     link: str
     at: str = ""
     on: str = ""
+
+    @property
+    def words(self) -> str:
+        """How it is said in a file: `crank at A on ground`."""
+        return self.link + (f" at {self.at}" if self.at else "") + (f" on {self.on}" if self.on else "")

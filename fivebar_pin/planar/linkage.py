@@ -16,14 +16,21 @@ from fivebar_pin.diagnosis import Actuation, Diagnosis, diagnose
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError, UnknownNameError
 from fivebar_pin.kinematics import assemble, closure_residual
 from fivebar_pin.planar._build import HOME, built
-from fivebar_pin.planar._parts import GROUND, Guide, Link, Lump, Motor, PointSpring, Section
+from fivebar_pin.planar._parts import (
+    ALUMINIUM,
+    GROUND,
+    THICKNESS,
+    WIDTH,
+    Guide,
+    Link,
+    Lump,
+    Motor,
+    PointSpring,
+    Section,
+)
 
-__all__ = ["ALUMINIUM", "Linkage"]
+__all__ = ["Linkage"]
 
-ALUMINIUM = 2700.0
-"""Density of bars and plates unless another is given [kg/m3]."""
-WIDTH, THICKNESS = 0.02, 0.01
-"""Section of bars, and thickness of plates, unless another is given [m]."""
 _CLOSED = 1e-12
 """Gap up to which a linkage is closed: round-off of its sketch, and where `assemble` stops [m, relative above 1 m]."""
 _DOWN = (0.0, -9.81, 0.0)
