@@ -12,6 +12,7 @@ from fivebar_pin._arrays import Array, skew
 from fivebar_pin.balancing._state import gravity_of, state_of, torque_offset, tree_torque
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import closure as closure_rows
+from fivebar_pin.dynamics.elastic import body_wrenches
 from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
 from fivebar_pin.trajectory import Trajectory
 
@@ -26,6 +27,8 @@ def reactions(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array, Array]
     joint = np.zeros((n, nb, 6, tau.shape[2]))
     for b in range(nb):
         joint[:, b, :, 10 * b : 10 * (b + 1)] = wrench[:, b]
+    if chain.springs:
+        joint[..., -1] -= body_wrenches(chain, loops, trajectory.v, state.poses)
     closure = np.zeros((n, len(chain.closures), 6, tau.shape[2]))
     if loops.m:
         pairs = loops.pairs(state.poses)

@@ -220,10 +220,14 @@ class Setup(Immutable):
         """Return conditions, physical bodies, regions and mass bounds."""
         n = E.shape[1]
         blocks = []
-        if self.conditions is not None and self.conditions.rank:
+        if self.conditions is not None and self.conditions.equations:
             R = self.conditions.rows
             labels = tuple(f"[{text}]" for text in self.conditions.equations)
-            blocks.append(Block(labels, "zero", R @ E, R @ X0))
+            held = self.conditions.constants(R) / self.mass  # what springs ask of the masses, none without springs
+            blocks.append(Block(labels[: len(R)], "zero", R @ E, R @ X0 + held))
+            if self.conditions.unheld:
+                never = np.array([self.conditions.unheld / self.mass])
+                blocks.append(Block(labels[-1], "zero", np.zeros((1, n)), never))
         for m in materials:
             blocks += m.blocks(n)
             if m.sign < 0:

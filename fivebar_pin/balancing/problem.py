@@ -3,7 +3,7 @@
 With x the parameters of the mechanism and delta, rho the material added and removed,
 
     x = x_0 + delta - rho,     delta, rho, x_0 - rho physical, delta and rho within their regions
-    B x = 0                    the balancing conditions
+    B x + b = 0                the balancing conditions, b = 0 without springs
 
 or x itself physical, within its region and within mass bounds (redesign). Every term of the objective is linear in x
 or a length of a vector linear in x, so the problem is a conic one: its optimum is global, its dual bounds it from
@@ -362,8 +362,9 @@ class BalanceProblem(Immutable):
             The variables and the largest residual left, scaled.
         """
         B = np.zeros((0, self.X0.size)) if self.conditions is None else self.conditions.basis
+        held = np.zeros(len(B)) if self.conditions is None else self.conditions.offset / self.mass
         A = np.concatenate([B @ self.E, self.fixed[:, :-1]])
-        b = np.concatenate([B @ self.X0, -self.fixed[:, -1]])
+        b = np.concatenate([B @ self.X0 + held, -self.fixed[:, -1]])
         mass = np.array([abs(float(y[m.start])) for m in self.materials])
         share = np.where((mass < drop) | np.array(self.gone), 0.0, np.maximum(mass, 1e-9))
         share = np.repeat(share, [m.size for m in self.materials])

@@ -9,8 +9,8 @@ acceleration alpha, and parameters m, h = m c, I about the joint origin, all sum
     E_kin = (u . p_lin + w . l_o) / 2           E_pot = -g . (m p + R h)
 
 Moments move to another point by the lever times the force. With S_j the joint columns that carry the body and N the
-complement, tau = sum N^T S_j^T [f; n]; the frame is shaken by -sum f_0 and carries -sum f. Armature, damping and dry
-friction do not depend on the parameters: they make the offset.
+complement, tau = sum N^T S_j^T [f; n]; the frame is shaken by -sum f_0 and carries -sum f. Armature, damping, dry
+friction and springs do not depend on the parameters: they make the offset.
 """
 
 from __future__ import annotations

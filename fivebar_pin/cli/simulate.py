@@ -85,6 +85,9 @@ def _torque(chain: ClosedChain, given: list[float] | None) -> list[float] | None
 
 def _why(chain: ClosedChain, torque: list[float] | None) -> str:
     """Say what a mechanism that stays at rest lacks."""
+    if chain.springs:
+        names = ", ".join(spring.name for spring in chain.springs)
+        return f"weight, torque, friction and springs ({names}) hold each other. Pass --torque, or another --gravity."
     if not np.any(chain.model.gravity.linear) and not np.any(torque or 0.0):
         return "it starts at rest, and there is no gravity and no torque. Pass --gravity X Y Z or --torque."
     if np.any(chain.model.upperDryFrictionLimit):

@@ -87,6 +87,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         determinate_closures=closures,
         joints=chain.joints,
         closures=tuple(c.name for c in chain.closures),
+        springs=tuple(s.name for s in chain.springs),
         problems=tuple(sorted(findings, key=lambda f: _ORDER.index(f.severity))),
     )
 

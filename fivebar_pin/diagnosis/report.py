@@ -115,6 +115,7 @@ class Diagnosis(Immutable):
         determinate_joints: which components of every joint's reaction are determinate (njoints - 1, 6).
         determinate_closures: the same for the closures (closures, 6), axes of frame 1; force before moment.
         joints, closures: names that the rows of these two belong to.
+        springs: names of the springs.
         problems: findings, the gravest first.
     """
 
@@ -139,6 +140,7 @@ class Diagnosis(Immutable):
     determinate_closures: npt.NDArray[np.bool_]
     joints: tuple[str, ...]
     closures: tuple[str, ...]
+    springs: tuple[str, ...]
     problems: tuple[Finding, ...]
 
     @property
@@ -178,6 +180,8 @@ def _lines(d: Diagnosis) -> Iterator[str]:
     for k, row in enumerate(d.redundant):
         yield _entry("" if k else "redundant", str(row))
     yield _entry("actuated", f"{', '.join(d.actuated) or 'none'}: {d.actuation.value}")
+    if d.springs:
+        yield _entry("springs", ", ".join(d.springs))
     if d.undetermined and d.actuated:
         yield _entry("left free", ", ".join(d.undetermined))
     if d.actuation in (Actuation.EXACT, Actuation.OVER):

@@ -182,7 +182,7 @@ class Loads(Immutable):
         linear, angular = speeds(loops_of(chain).tree, path.q, moving.centre, path.N)  # (n, nb, na)
         work = np.sum((force + weight)[..., None] * linear + moment[..., None] * angular, axis=1)
         other = np.abs(np.array(chain.model.armature) * path.a) + np.abs(friction_torque(chain, path.v))
-        other = other + np.abs(self._sprung.force) + generalised
+        other = other + self._sprung.size + generalised
         shaking, about = force.sum(axis=1), np.sum(moment + arm * force, axis=1)
         return {
             "torque": (work + np.einsum("nvk,nv->nk", np.abs(path.N), other)).max(axis=1, initial=0.0),

@@ -11,6 +11,7 @@ import pinocchio as pin
 from fivebar_pin._arrays import checked
 from fivebar_pin._files import MAX_BYTES, as_path
 from fivebar_pin.chain import ClosedChain, Geometry, Visual, frames_by_name
+from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
@@ -18,6 +19,7 @@ from fivebar_pin.io._entries import TreeEntry
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
 from fivebar_pin.io._urdf import read_urdf
+from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["load"]
 
@@ -159,6 +161,7 @@ def _load_urdf(
         check_closures(model, sidecar.closures, note, "closed_loop")
     if actuated is None:
         check_actuated(model, tree, sidecar, note)
+    check_springs(model, sidecar.springs, note)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     return make_chain(
         model,
@@ -167,6 +170,7 @@ def _load_urdf(
         visuals,
         urdf,
         argument=closures is not None or actuated is not None,
+        springs=sidecar.springs,
         geometry=sidecar.geometry,
     )
 
@@ -179,12 +183,13 @@ def make_chain(
     file: Path,
     *,
     argument: bool,
+    springs: tuple[Spring | JointSpring, ...] = (),
     geometry: Geometry | None = None,
 ) -> ClosedChain:
     """Return the chain; what is wrong with the file's own content is told as an error of the file."""
+    named = Geometry() if geometry is None else geometry
     try:
-        named = Geometry() if geometry is None else geometry
-        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, geometry=named)
+        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, springs=springs, geometry=named)
     except FileFormatError:
         raise
     except FiveBarPinError as error:
@@ -227,3 +232,12 @@ def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Pa
             raise FileFormatError(file, f"name_mot: {name!r} is not a joint that moves ({how}); it cannot be driven")
         else:
             raise FileFormatError(file, "name_mot: " + str(UnknownNameError("joint", name, joints)))
+
+
+def check_springs(model: pin.Model, springs: tuple[Spring | JointSpring, ...], file: Path) -> None:
+    """Refuse springs on frames or joints that do not exist, or that a chain cannot have."""
+    for k, spring in enumerate(springs):
+        try:
+            checked_springs(model, (spring,))
+        except FiveBarPinError as error:
+            raise FileFormatError(file, f"springs[{k}]: {error}") from error

@@ -15,9 +15,11 @@ from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._build import build_model
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
+from fivebar_pin.io._mjcf_springs import tendon_springs
 from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
 from fivebar_pin.io._sidecar import Sidecar
 from fivebar_pin.io._xml import parse_xml
+from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["HINGE", "ORDER", "UNBOUNDED", "read_mjcf"]
 
@@ -30,10 +32,9 @@ file's order, when the chain has them in another.
 
 _SECTIONS = (
     "actuator", "asset", "compiler", "contact", "custom", "default", "equality", "keyframe", "option", "sensor", "size",
-    "statistic", "visual", "worldbody",
+    "statistic", "tendon", "visual", "worldbody",
 )  # fmt: skip
 _REFUSED = {
-    "tendon": "tendons are not supported; remove the section or model them as forces",
     "deformable": "deformable bodies are not supported",
     "include": "included files are not read; merge them into this one",
     "extension": "plugins are not supported",
@@ -55,7 +56,8 @@ def read_mjcf(
     """Return the chain that an MJCF file describes; see `fivebar_pin.io.load`.
 
     Coordinates are in MuJoCo's order. Read: bodies, hinge / slide / ball / free joints with their limits and losses,
-    inertias stated or from solid geoms, default classes, connect and weld, keyframes. Contacts, cameras, lights and
+    inertias stated or from solid geoms, default classes, connect and weld, keyframes, springs of joints and spatial
+    tendons between two sites as springs. Contacts, cameras, lights and
     sensors are not part of a mechanism and are passed over. Whatever else acts on it is refused by name.
     """
     root = parse_xml(path, root="mujoco", max_bytes=max_bytes)
@@ -73,9 +75,10 @@ def read_mjcf(
     sidecar = Sidecar(gravity=_gravity(reader, root), joint_order=_order(reader, root, bodies), joint_data=bodies.data)
     model = build_model(tree, sidecar, free_flyer=False, urdf=path, beside=path)
     _keyframes(reader, root, model, bodies.order)
+    springs: tuple[Spring | JointSpring, ...] = (*tendon_springs(reader, root, bodies, model), *bodies.springs)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     try:
-        return ClosedChain(model, found, driven, name=tree.name, visuals=visuals)
+        return ClosedChain(model, found, driven, name=tree.name, visuals=visuals, springs=springs)
     except FiveBarPinError as error:
         if closures is not None or actuated is not None:
             raise
@@ -138,6 +141,8 @@ def _unbounded(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) 
             joint = bodies.joints.get(name[len(UNBOUNDED) :])
             if joint is None or joint.kind != "revolute":
                 raise reader.fail(f"custom {name!r}", "names no hinge of this file")
+            if any(spring.joint == joint.name for spring in bodies.springs):
+                raise reader.fail(f"joint {joint.name!r}", "stiffness of a hinge that does not count its turns")
             data = {word: joint.data[word] for word in ("effort", "velocity")}
             bodies.joints[joint.name] = replace(joint, kind="continuous", data=data)
 

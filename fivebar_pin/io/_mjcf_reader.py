@@ -26,6 +26,8 @@ geom      name class type contype conaffinity condim group priority size materia
 site      name class type group {_POSE} material size fromto rgba user
 connect   name class active solref solimp body1 body2 anchor site1 site2
 weld      name class active solref solimp body1 body2 relpose anchor site1 site2 torquescale
+tendon    name class group limited range solreflimit solimplimit solreffriction solimpfriction margin frictionloss
+          springlength stiffness damping armature actuatorfrclimited actuatorfrcrange width material rgba user
 """
 
 

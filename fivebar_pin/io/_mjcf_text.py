@@ -1,9 +1,9 @@
-"""A chain to MJCF text: bodies at their joints, frames as sites, closures as connect and weld.
+"""A chain to MJCF text: bodies at their joints, frames as sites, closures as connect and weld, springs as tendons.
 
 A revolute closure becomes two connects, at the closure's frames and at a second point of the hinge axis; a
 <custom><numeric> entry with the axis marks the pair, so that reading gives the one revolute closure back. A second
-entry keeps the order of joints that were not added depth first. MJCF has no place for velocity limits, rotor inertias
-and gear ratios; the URDF and its sidecar keep them.
+entry keeps the order of joints that were not added depth first. A spring on a joint is that joint's own. MJCF has no
+place for velocity limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
 from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf_springs import joint_springs_to_write
 from fivebar_pin.io._outline import outline
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
+from fivebar_pin.springs import Spring
 
 __all__ = ["mjcf_text"]
 
@@ -36,7 +38,7 @@ def mjcf_text(chain: ClosedChain, folder: Path) -> str:
     """Return the MJCF text of a chain, with meshes named relative to `folder`.
 
     Raises:
-        InvalidInputError: a joint kind that MJCF lacks, or a free joint that does not hang on the world.
+        InvalidInputError: a joint kind or a spring that MJCF lacks, or a free joint that does not hang on the world.
     """
     return _Writer(chain, folder).text()
 
@@ -52,10 +54,11 @@ class _Writer:
         self.extra_sites: dict[str, list[tuple[str, Array]]] = {}
         self.numeric: list[str] = []
         self.order: list[int] = []
+        self.joint_springs = joint_springs_to_write(chain)
         self.sites = {j.child for j in self.tree.joints.values() if j.kind == "fixed"}
 
     def text(self) -> str:
-        equality = self.equality()
+        equality, tendons = self.equality(), self.tendons()
         bodies = self.contents(self.tree.root, "    ")
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
@@ -70,6 +73,7 @@ class _Writer:
             f'  <option gravity="{gravity}"/>',
             *_section("asset", meshes),
             *_section("worldbody", bodies),
+            *_section("tendon", tendons),
             *_section("equality", equality),
             *_section("actuator", motors),
             *_section("keyframe", self.keyframes()),
@@ -140,8 +144,14 @@ class _Writer:
             values = np.array(getattr(model, field))[v]
             if np.ptp(values) > 0.0:
                 raise InvalidInputError(f"{word} of joint {joint.name}", values.tolist(), "must be one number in MJCF")
-            if values[0]:
-                words.append(f'{word}="{numbers(values[:1])}"')
+            value = float(values[0])
+            if word == "damping" and joint.name in self.joint_springs:
+                value += self.joint_springs[joint.name].damping
+            if value:
+                words.append(f'{word}="{numbers([value])}"')
+        if joint.name in self.joint_springs:
+            spring = self.joint_springs[joint.name]
+            words.append(f'stiffness="{numbers([spring.stiffness])}" springref="{numbers([spring.rest])}"')
         return f"{indent}<joint {' '.join(words)}/>"
 
     def limits(self, joint: JointEntry, j: int) -> list[str]:
@@ -166,6 +176,17 @@ class _Writer:
                 ends = [self.second_site(name, offset) for name in closure.frames]
                 lines.append(_closure("connect", f"{closure.name} axis", ends))
                 self.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
+        return lines
+
+    def tendons(self) -> list[str]:
+        lines = []
+        for spring in self.chain.springs:
+            if isinstance(spring, Spring):
+                words = f'stiffness="{numbers([spring.stiffness])}" springlength="{numbers([spring.length])}"'
+                if spring.damping:
+                    words += f' damping="{numbers([spring.damping])}"'
+                ends = "".join(f"<site site={quoteattr(self.site(f))}/>" for f in (spring.frame1, spring.frame2))
+                lines.append(f"    <spatial {words}>{ends}</spatial>")
         return lines
 
     def pose(self, frame: str) -> tuple[str, Array]:

@@ -3,13 +3,15 @@
 Keys that example-parallel-robots uses: ``closed_loop``, ``type``, ``name_mot``, ``joint_name``, ``joint_type``.
 Ours, written only when needed: ``axis`` and ``closure_name`` (one entry per closure), ``gravity``, ``joint_order``,
 ``joint_data`` (per joint: armature, limits and losses of joints with several coordinates),
-``reference_configurations`` and ``parameters`` (named lengths and what follows them, see `_geometry`).
+``reference_configurations``, ``springs`` (each with ``frames``, ``stiffness``, ``length`` or ``joint``,
+``stiffness``, ``rest``, and ``damping`` where it has some) and ``parameters`` (named lengths and what follows them, see
+`_geometry`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._geometry import geometry_entries, read_geometry
 from fivebar_pin.io._xml import HUGE, UNLIMITED
+from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = [
     "DATA_FIELDS",
@@ -60,7 +63,7 @@ DATA_WORDS = tuple(DATA_FIELDS)
 
 _KEYS = (
     "closed_loop", "type", "name_mot", "joint_name", "joint_type", "axis", "closure_name", "gravity", "joint_order",
-    "joint_data", "reference_configurations", "parameters",
+    "joint_data", "reference_configurations", "springs", "parameters",
 )  # fmt: skip
 
 
@@ -75,6 +78,7 @@ class Sidecar:
     joint_order: tuple[str, ...] | None = None
     joint_data: Mapping[str, Mapping[str, list[float]]] = field(default_factory=dict)
     configurations: Mapping[str, list[float]] = field(default_factory=dict)
+    springs: tuple[Spring | JointSpring, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
 
 
@@ -112,6 +116,8 @@ def dump_sidecar(sidecar: Sidecar) -> str:
         content["joint_data"] = {j: {k: _floats(v) for k, v in d.items()} for j, d in sidecar.joint_data.items()}
     if sidecar.configurations:
         content["reference_configurations"] = {k: _floats(v) for k, v in sidecar.configurations.items()}
+    if sidecar.springs:
+        content["springs"] = [_spring(s) for s in sidecar.springs]
     if sidecar.geometry.parameters:
         content["parameters"] = geometry_entries(sidecar.geometry)
     return "".join(
@@ -122,6 +128,14 @@ def dump_sidecar(sidecar: Sidecar) -> str:
 
 def _floats(values: Any) -> list[float]:
     return [float(v) for v in values]
+
+
+def _spring(spring: Spring | JointSpring) -> dict[str, Any]:
+    """Return the plain entry of a spring, without a damping of zero."""
+    ends: dict[str, Any] = {"frames": [spring.frame1, spring.frame2]} if isinstance(spring, Spring) else {}
+    rest = {f.name: getattr(spring, f.name) for f in fields(spring) if f.name not in ("frame1", "frame2")}
+    entry = ends | {word: x if isinstance(x, str) else float(x) for word, x in rest.items()}
+    return entry if spring.damping else {word: x for word, x in entry.items() if word != "damping"}
 
 
 def plain_yaml(path: Path, max_bytes: int) -> object:
@@ -184,6 +198,7 @@ class _Check:
             joint_order=None if order is None else tuple(self.names("joint_order", order)),
             joint_data=self.joint_data(content.get("joint_data")),
             configurations=self.configurations(content.get("reference_configurations")),
+            springs=self.springs(content.get("springs")),
             geometry=read_geometry(self, content.get("parameters")),
         )
 
@@ -231,6 +246,36 @@ class _Check:
     def configurations(self, value: object) -> dict[str, list[float]]:
         mapping = self.mapping("reference_configurations", value)
         return {name: self.numbers(f"reference_configurations of {name}", q) for name, q in mapping.items()}
+
+    def springs(self, value: object) -> tuple[Spring | JointSpring, ...]:
+        entries = [] if value is None else self.sequence("springs", value)
+        return tuple(self.spring(f"springs[{k}]", entry) for k, entry in enumerate(entries))
+
+    def spring(self, key: str, value: object) -> Spring | JointSpring:
+        entry = self.mapping(key, value)
+        on_joint = "joint" in entry
+        place = "rest" if on_joint else "length"
+        words = ("joint" if on_joint else "frames", "stiffness", place, "damping")
+        for word in entry:
+            if word not in words:
+                raise self.fail(key, str(UnknownNameError("spring data", word, words)))
+        for word in words[:3]:
+            if word not in entry:
+                raise self.fail(
+                    key, f"{word} is missing; a spring needs frames, stiffness, length or joint, stiffness, rest"
+                )
+        k, at, c = (
+            self.numbers(f"{key}, {word}", [entry.get(word, 0.0)], 1)[0] for word in ("stiffness", place, "damping")
+        )
+        try:
+            if on_joint:
+                return JointSpring(self.names(f"{key}, joint", [entry["joint"]])[0], k, at, c)
+            first, second = self.names(f"{key}, frames", entry["frames"], 2)
+            return Spring(first, second, k, at, c)
+        except FileFormatError:
+            raise
+        except FiveBarPinError as error:
+            raise self.fail(key, str(error)) from error
 
     def mapping(self, key: str, value: object) -> dict[str, Any]:
         if value is None:

@@ -14,12 +14,13 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin.chain import find_frame
 from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.springs import Spring
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain
     from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]
+__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes", "spring_ends"]
 
 _PARALLEL = 1e-6
 """Sine of the largest angle [-] between two axes that count as parallel."""
@@ -119,7 +120,7 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
     """Return the points (k, 3) [m] that the body of a joint connects, in its own frame, its own joint first.
 
     These are the joints it carries and its closure frames; for the last body of a branch the farthest frame
-    on it, or its mass centre when there is none.
+    on it, or its mass centre when there is none. The ends of springs on it come last.
     """
     model = chain.model
     points = [np.zeros(3)]
@@ -134,7 +135,17 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
         ends.append(np.array(model.inertias[joint].lever))
         tip = max(ends, key=lambda p: float(np.linalg.norm(p)))
         points.append(tip)
+    held = [f for s in chain.springs if isinstance(s, Spring) for f in (s.frame1, s.frame2)]
+    frames = [find_frame(model, name) for name in held]
+    points += [np.array(f.placement.translation) for f in frames if f.parentJoint == joint]
     return _distinct(np.array(points))
+
+
+def spring_ends(chain: ClosedChain, spring: Spring, joints: Array) -> tuple[Array, Array]:
+    """Return where the ends of a spring are (n, 3) each [m], from the poses of the joint frames (n, njoints, 4, 4)."""
+    frames = (find_frame(chain.model, name) for name in (spring.frame1, spring.frame2))
+    first, second = (joints[:, f.parentJoint] @ f.placement.homogeneous for f in frames)
+    return first[:, :3, 3], second[:, :3, 3]
 
 
 def _distinct(points: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Draw one mechanism into a recorder: bodies, joints, closures, ground, mass centres, trace and force arrow."""
+"""Draw one mechanism into a recorder: bodies, joints, closures, springs, ground, mass centres, trace, force."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from fivebar_pin.viz._drawing import (
     safe,
 )
 from fivebar_pin.viz._geometry import JointShape, body_points, joint_shapes
-from fivebar_pin.viz._recording import Recorder, along, pose
+from fivebar_pin.viz._recording import Recorder, along, pose, quaternions
+from fivebar_pin.viz._springs import draw_springs
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain
@@ -45,6 +46,7 @@ def draw_mechanism(recorder: Recorder, path: str, drawing: Drawing) -> None:
         _move(recorder, node, drawing, drawing.poses.joints[:, j])
     _draw_visuals(recorder, path, drawing)
     _draw_closures(recorder, path, drawing)
+    draw_springs(recorder, path, drawing)
     _draw_ground(recorder, f"{path}/ground", drawing, shapes)
     _draw_com(recorder, path, drawing)
     if drawing.force is not None and drawing.arrow > 0.0:
@@ -199,7 +201,7 @@ def _draw_force(recorder: Recorder, path: str, drawing: Drawing, force: Array) -
     shaft = np.maximum(length - head * size, 1e-6 * head)
     directions = np.where(size[:, None] > 1e-6, force, drawing.view.up)
     zero = np.zeros_like(length)
-    recorder.animate(path, drawing.times, quaternion=_quaternions(np.array([along(f) for f in directions])))
+    recorder.animate(path, drawing.times, quaternion=quaternions(np.array([along(f) for f in directions])))
     recorder.animate(f"{path}/shaft", drawing.times, scale=np.stack([size, size, shaft], axis=1))
     tips = np.stack([zero, zero, length], axis=1)
     recorder.animate(f"{path}/head", drawing.times, position=tips, scale=np.stack([size, size, size], axis=1))
@@ -209,14 +211,4 @@ def _move(recorder: Recorder, path: str, drawing: Drawing, placements: Array) ->
     """Move a node along placements (n, 4, 4)."""
     recorder.place(path, placements[0])
     shown = placements[drawing.keys]
-    recorder.animate(path, drawing.times, position=shown[:, :3, 3], quaternion=_quaternions(shown[:, :3, :3]))
-
-
-def _quaternions(rotations: Array) -> Array:
-    """Return x, y, z, w (k, 4) of rotations (k, 3, 3), without jumps of sign."""
-    from scipy.spatial.transform import Rotation
-
-    Q = np.asarray(Rotation.from_matrix(rotations).as_quat())
-    flips = np.cumprod(np.where(np.sum(Q[1:] * Q[:-1], axis=1) < 0.0, -1.0, 1.0))
-    Q[1:] *= flips[:, None]
-    return Q
+    recorder.animate(path, drawing.times, position=shown[:, :3, 3], quaternion=quaternions(shown[:, :3, :3]))

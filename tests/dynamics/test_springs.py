@@ -12,7 +12,7 @@ from mechanisms import TILTED, body, five_bar, point, rssr, slider_crank
 import fivebar_pin as fb
 from fivebar_pin import JointSpring, Motion, Spring
 from fivebar_pin import motion as laws
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
 
 def anchored(chain: fb.ClosedChain) -> fb.ClosedChain:
@@ -175,3 +175,82 @@ def test_springs_stay_with_the_chain_through_every_change():
     assert replace(chain, name="other").springs == springs
     assert "springs: hook~left_elbow_body, left_body~tip_right, on right_elbow, on left)" in repr(chain)
     assert "springs" not in repr(chain.with_springs(()))
+
+
+def hinged(joint: pin.JointModel, *springs: Spring | JointSpring) -> fb.ClosedChain:
+    """One body on one joint in no gravity; `anchor` is 0.5 m from it in the ground, `tip` 0.5 m along the body."""
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    index = model.addJoint(0, joint, pin.SE3.Identity(), "hinge")
+    model.appendBodyToJoint(index, body(1), pin.SE3.Identity())
+    for parent, name in ((0, "anchor"), (index, "tip")):
+        point(model, parent, name, pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0])))
+    return fb.ClosedChain(model, (), ("hinge",), springs=springs)
+
+
+def at_angle(chain: fb.ClosedChain, angle: float, speed: float = 0.0) -> fb.Loads:
+    """Return the loads of the hinge at one angle."""
+    q = [np.cos(angle), np.sin(angle)] if chain.nq == 2 else [angle]
+    v = np.full((1, 1), speed)
+    path = fb.Trajectory(np.zeros(1), np.array([q]), v, 0.0 * v, np.ones((1, 1, 1)), np.zeros(1))
+    return fb.inverse_dynamics(chain, path)
+
+
+@pytest.mark.parametrize("rest", [2.5, 2.5 - 2.0 * np.pi, 2.5 + 6.0 * np.pi])
+@pytest.mark.parametrize("turned", [-3.0, -1.0, 0.0, 1.0, 3.0])
+def test_a_spring_on_a_joint_without_turns_pulls_the_shorter_way_round(rest, turned):
+    """Such a joint knows no turns: the deflection lies within half of one, whatever turn the rest is stated in."""
+    chain = hinged(pin.JointModelRUBZ(), JointSpring("hinge", 3.0, rest))
+    loads = at_angle(chain, rest + turned)
+    np.testing.assert_allclose(loads.torque, [[3.0 * turned]], atol=1e-13)
+    np.testing.assert_allclose(loads.elastic_energy, [1.5 * turned**2], atol=1e-13)
+
+
+@pytest.mark.parametrize("turned", [-7.0, 4.0, 20.0])
+def test_a_spring_on_a_hinge_counts_its_turns(turned):
+    chain = hinged(pin.JointModelRZ(), JointSpring("hinge", 3.0, 2.5))
+    np.testing.assert_allclose(at_angle(chain, 2.5 + turned).torque, [[3.0 * turned]], rtol=1e-15)
+
+
+def test_a_spring_of_no_length_whose_ends_meet_pulls_nowhere():
+    chain = hinged(pin.JointModelRZ(), Spring("anchor", "tip", 40.0, 0.0))
+    loads = at_angle(chain, 0.0, speed=2.0)
+    np.testing.assert_array_equal(loads.torque, [[0.0]])
+    np.testing.assert_array_equal(loads.elastic_energy, [0.0])
+    np.testing.assert_array_equal(loads.reactions.sprung, np.zeros((1, 1, 6)))
+    small = at_angle(chain, 1e-9)  # and close by as the law says, k a^2 sin
+    np.testing.assert_allclose(small.torque, [[40.0 * 0.25 * 1e-9]], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("length", "damping"), [(0.1, 0.0), (0.0, 2.0), (0.1, 2.0)])
+def test_a_force_without_a_direction_is_an_error(length, damping):
+    chain = hinged(pin.JointModelRZ(), Spring("anchor", "tip", 40.0, length, damping))
+    with pytest.raises(SolverError, match=r"spring anchor~tip has its ends on one point.*free length of zero"):
+        at_angle(chain, 0.0)
+    assert np.isfinite(at_angle(chain, 1e-6).torque).all()
+    with pytest.raises(SolverError, match="spring anchor~tip has its ends on one point"):
+        fb.forward_dynamics(chain, [0.0], [0.0])
+
+
+def test_a_diagnosis_does_not_ask_what_springs_pull():
+    chain = hinged(pin.JointModelRZ(), Spring("anchor", "tip", 40.0, 0.1))
+    found = fb.diagnose(chain, [0.0])
+    assert found.springs == ("anchor~tip",)
+    bare = fb.diagnose(chain.with_springs(()), [0.0])
+    np.testing.assert_array_equal(found.determinate_joints, bare.determinate_joints)
+
+
+def test_what_springs_leave_of_each_other_is_round_off_and_told_as_none():
+    pulls = [JointSpring("hinge", 1e9 / 3.0, rest) for rest in (0.1, 0.2, -0.3)]
+    loads = at_angle(hinged(pin.JointModelRZ(), *pulls), 0.0)
+    assert 0.0 < np.abs(loads.torque).max() < 1e-6
+    assert loads.peak("torque") == 0.0
+    alone = at_angle(hinged(pin.JointModelRZ(), pulls[0]), 0.0)
+    assert alone.peak("torque") == pytest.approx(1e8 / 3.0)
+
+
+@pytest.mark.parametrize("bad", ["stiffness", "damping", "length"])
+def test_an_infinite_or_negative_spring_is_refused(bad):
+    for value in (np.nan, np.inf, -1.0):
+        with pytest.raises(InvalidInputError, match=bad if bad != "length" or value == -1.0 else "rest"):
+            Spring("a", "b", **{"stiffness": 1.0, "length": 1.0, "damping": 0.0, bad: value})
