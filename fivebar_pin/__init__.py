@@ -20,7 +20,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from fivebar_pin import balancing, io, motion, paper, planar, viz
+    from fivebar_pin import balancing, io, motion, paper, viz
+    from fivebar_pin import planar as planar
+    from fivebar_pin import shipped as shipped
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure, ClosureKind
@@ -66,7 +68,6 @@ __all__ = [
     "motion",
     "paper",
     "pareto",
-    "planar",
     "save",
     "score",
     "simulate",

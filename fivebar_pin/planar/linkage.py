@@ -216,7 +216,7 @@ class Linkage:
         chain = built(
             self.name,
             self.sketch,
-            self.links,
+            dict(sorted(self.links.items(), key=lambda item: _rank(item[1]))),
             motors=motors,
             lumps=self.lumps,
             springs=self.springs,
@@ -348,6 +348,11 @@ class Linkage:
             return joint
         shared = [point for point in link.points if point in self.links[parent].points] if parent in self.links else []
         return f"{joint} at {shared[0]}" if shared else joint
+
+
+def _rank(link: Link) -> int:
+    """Order links as files do, so that what is read back is the same to the last frame: bars, plates, slides."""
+    return 2 if link.guide is not None else int(link.section is not None and link.section.plate)
 
 
 def _parent_of(chain: ClosedChain, joint: str) -> str:
