@@ -20,6 +20,7 @@ import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
+import fivebar_pin.chain
 from fivebar_pin import balancing, errors, paper
 from fivebar_pin._arrays import Immutable
 from fivebar_pin.balancing import solvers
@@ -202,6 +203,10 @@ def specimens() -> tuple[object, ...]:
         fb.diagnosis.propose_closures(fb.ClosedChain(five.model, (), ())),
         fb.diagnosis.propose_motors(five),
     )
+    bodies = (fb.chain.BarBody(("a", "b"), 0.5), fb.chain.LumpBody(("a",), 1.0))
+    plate = fb.chain.PlateBody(("a", "b", "c"), 2700.0, 0.01)
+    elbow = fb.chain.Placement("elbow", (("l", np.eye(6)[0]),))
+    own += (fb.chain.Geometry({"l": 0.3}, (elbow,), (*bodies, plate), ("l",)),)
     return (
         *(chain, motion, trajectory, loads, free, energy, linkage, five, solution, problem, design, none, front, score),
         *CLOSURES,

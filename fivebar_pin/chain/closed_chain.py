@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,8 @@ from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
 from fivebar_pin.chain.counting import counting_turns
 from fivebar_pin.chain.frames import frames_by_name
+from fivebar_pin.chain.parameters import Geometry
+from fivebar_pin.chain.reshape import put_in_place, reshaped
 from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.chain.visual import Visual
 from fivebar_pin.closures import Closure
@@ -36,6 +38,7 @@ class ClosedChain(Immutable):
         name: what reports call the mechanism; the model's name unless given.
         visuals: shapes to draw.
         springs: springs and dampers between frames and on joints; all dynamics and balancing take them from here.
+        geometry: named lengths and placements, and how joints, frames and bodies follow them; none unless given.
 
     Raises:
         InvalidInputError: a closure within one body, a joint named twice or with several degrees of freedom, a spring
@@ -49,6 +52,7 @@ class ClosedChain(Immutable):
     name: str = ""
     visuals: tuple[Visual, ...] = ()
     springs: tuple[Spring | JointSpring, ...] = ()
+    geometry: Geometry = field(default_factory=Geometry)
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, pin.Model):
@@ -57,6 +61,9 @@ class ClosedChain(Immutable):
         for name, kind in (("closures", Closure), ("actuated", str), ("visuals", Visual)):
             object.__setattr__(self, name, all_of(name, getattr(self, name), kind))
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
+        if not isinstance(self.geometry, Geometry):
+            raise InvalidInputError("geometry", self.geometry, "must be a Geometry")
+        put_in_place(self.model, self.geometry)
         check_tree(self.model)
         check_closures(self.model, self.closures)
         counted = {name for closure in self.closures for name in closure.counted}
@@ -126,6 +133,11 @@ class ClosedChain(Immutable):
         """Named configurations that came with the model (nq,)."""
         return {entry.key(): frozen(entry.data()) for entry in self.model.referenceConfigurations}
 
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Named lengths and placements and their values, read-only [m or rad]; `with_parameters` changes them."""
+        return self.geometry.parameters
+
     @cached_property
     def length(self) -> float:
         """Characteristic length [m]: the mean distance between neighbouring joints, closures included.
@@ -155,6 +167,25 @@ class ClosedChain(Immutable):
         """Return the same mechanism with the given inertial parameters (njoints - 1, 10)."""
         pi = checked("inertial parameters", parameters, (self.model.njoints - 1, 10))
         return self.with_inertias({j: _inertia(j, row) for j, row in zip(self.joints, pi, strict=True)})
+
+    def with_parameters(self, values: Mapping[str, float] | None = None, /, **named: float) -> ClosedChain:
+        """Return the same mechanism with other values of its named lengths and placements.
+
+        Joints and frames go where the new values put them; bodies follow by their rules, and so do their boxes among
+        the visuals; what a link carries beyond its rules stays where it is on the link. Named configurations
+        (`references`) are kept as they are: they no longer close the loops, and are starts for `assemble`.
+
+        Args:
+            values: by name [m or rad]; for names that are no words of Python.
+            named: the same as keywords.
+
+        Raises:
+            UnknownNameError: no such parameter; lists those there are.
+            InvalidInputError: not a finite number, a length that is not positive, or a body cut down to nothing.
+        """
+        geometry = self.geometry.with_values({**(values or {}), **named})
+        model, visuals = reshaped(self.model, self.visuals, geometry)
+        return replace(self, model=model, visuals=visuals, geometry=geometry)
 
     def with_gravity(self, gravity: npt.ArrayLike) -> ClosedChain:
         """Return the same mechanism under another gravity (3,) [m/s2]."""

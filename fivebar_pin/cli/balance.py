@@ -130,7 +130,7 @@ def run_pareto(chosen: argparse.Namespace) -> int:
 
 
 def _common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
     parser.add_argument("--kind", choices=KINDS, default="force", help="what is to vanish [force]")
     add_gravity(parser)
     parser.add_argument(

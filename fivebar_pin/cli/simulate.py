@@ -22,7 +22,7 @@ _LONGEST = 1e9  # time to simulate [s]; a progress bar cannot even show more
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser("simulate", help="integrate the motion of a mechanism under gravity and given torques")
-    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
     parser.add_argument("--time", type=float, default=2.0, help="time to simulate [2 s]")
     parser.add_argument("--samples", type=int, default=201, help="output samples [201]")
     parser.add_argument("--torque", type=float, nargs="+", help="constant torque of each actuated joint [0]")

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import checked
 from fivebar_pin._files import MAX_BYTES, as_path
-from fivebar_pin.chain import ClosedChain, Visual, frames_by_name
+from fivebar_pin.chain import ClosedChain, Geometry, Visual, frames_by_name
 from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
@@ -172,6 +172,7 @@ def _load_urdf(
         urdf,
         argument=closures is not None or actuated is not None,
         springs=sidecar.springs,
+        geometry=sidecar.geometry,
     )
 
 
@@ -184,10 +185,12 @@ def make_chain(
     *,
     argument: bool,
     springs: tuple[Spring | JointSpring, ...] = (),
+    geometry: Geometry | None = None,
 ) -> ClosedChain:
     """Return the chain; what is wrong with the file's own content is told as an error of the file."""
+    named = Geometry() if geometry is None else geometry
     try:
-        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, springs=springs)
+        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, springs=springs, geometry=named)
     except FileFormatError:
         raise
     except FiveBarPinError as error:

@@ -3,9 +3,10 @@
 Keys that example-parallel-robots uses: ``closed_loop``, ``type``, ``name_mot``, ``joint_name``, ``joint_type``.
 Ours, written only when needed: ``closure_name`` and what the kinds of closure state of themselves (``axis``,
 ``length``, ``ratio``, ``offset``), one entry per closure; ``gravity``, ``joint_order``, ``joint_data`` (per joint:
-armature, limits and losses of joints with several coordinates), ``reference_configurations`` and ``springs`` (each with
-``frames``, ``stiffness``, ``length`` or ``joint``, ``stiffness``, ``rest``, and ``damping`` where it has some).
-``closed_loop`` names two frames, for a coupling any number of joints, whose ratios stand in the same order:
+armature, limits and losses of joints with several coordinates), ``reference_configurations``, ``springs`` (each with
+``frames``, ``stiffness``, ``length`` or ``joint``, ``stiffness``, ``rest``, and ``damping`` where it has some) and
+``parameters`` (named lengths and what follows them, see `_geometry`). ``closed_loop`` names two frames, for a coupling
+any number of joints, whose ratios stand in the same order:
 
     closed_loop: [[tip_left, tip_right], [rod_end, slider], [wheel, crank]]
     type: [3d, distance, coupling]
@@ -23,13 +24,24 @@ from pathlib import Path
 from typing import Any
 
 from fivebar_pin._files import read_bounded
+from fivebar_pin.chain import Geometry
 from fivebar_pin.closures import Closure
 from fivebar_pin.closures.closure import Entry
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
+from fivebar_pin.io._geometry import geometry_entries, read_geometry
 from fivebar_pin.io._xml import HUGE, UNLIMITED
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "UNIVERSAL", "Sidecar", "dump_sidecar", "read_sidecar"]
+__all__ = [
+    "DATA_FIELDS",
+    "DATA_WORDS",
+    "JOINT_WORDS",
+    "UNIVERSAL",
+    "Sidecar",
+    "dump_sidecar",
+    "plain_yaml",
+    "read_sidecar",
+]
 
 MAX_SIDECAR_BYTES = 1024 * 1024
 MAX_DEPTH = 20
@@ -60,7 +72,7 @@ DATA_WORDS = tuple(DATA_FIELDS)
 
 _KEYS = (
     "closed_loop", "type", "name_mot", "joint_name", "joint_type", "closure_name", "gravity", "joint_order",
-    "joint_data", "reference_configurations", "springs",
+    "joint_data", "reference_configurations", "springs", "parameters",
 )  # fmt: skip
 
 
@@ -76,6 +88,7 @@ class Sidecar:
     joint_data: Mapping[str, Mapping[str, list[float]]] = field(default_factory=dict)
     configurations: Mapping[str, list[float]] = field(default_factory=dict)
     springs: tuple[Spring | JointSpring, ...] = ()
+    geometry: Geometry = field(default_factory=Geometry)
 
 
 def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
@@ -84,7 +97,7 @@ def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
     Raises:
         FileFormatError: not YAML of plain values, an unknown or missing key, or a value of the wrong type.
     """
-    return _Check(path).sidecar(_plain_yaml(path, max_bytes))
+    return _Check(path).sidecar(plain_yaml(path, max_bytes))
 
 
 def dump_sidecar(sidecar: Sidecar) -> str:
@@ -114,6 +127,8 @@ def dump_sidecar(sidecar: Sidecar) -> str:
         content["reference_configurations"] = {k: _floats(v) for k, v in sidecar.configurations.items()}
     if sidecar.springs:
         content["springs"] = [_spring(s) for s in sidecar.springs]
+    if sidecar.geometry.parameters:
+        content["parameters"] = geometry_entries(sidecar.geometry)
     return "".join(
         yaml.safe_dump({key: value}, default_flow_style=True, width=10**6, allow_unicode=True).strip()[1:-1] + "\n"
         for key, value in content.items()
@@ -137,7 +152,7 @@ def _spring(spring: Spring | JointSpring) -> dict[str, Any]:
     return entry if spring.damping else {word: x for word, x in entry.items() if word != "damping"}
 
 
-def _plain_yaml(path: Path, max_bytes: int) -> object:
+def plain_yaml(path: Path, max_bytes: int) -> object:
     """Return the one document of a YAML file, without aliases, tags, doubled keys or deep nests."""
     import yaml
 
@@ -199,6 +214,7 @@ class _Check:
             joint_data=self.joint_data(content.get("joint_data")),
             configurations=self.configurations(content.get("reference_configurations")),
             springs=self.springs(content.get("springs")),
+            geometry=read_geometry(self, content.get("parameters")),
         )
 
     def closures(self, content: dict[str, Any]) -> tuple[Closure, ...]:

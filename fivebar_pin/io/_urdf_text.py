@@ -73,6 +73,7 @@ def _sidecar(chain: ClosedChain, tree: TreeEntry) -> Sidecar:
         joint_data=data,
         configurations={name: [float(x) for x in q] for name, q in configurations(model)},
         springs=chain.springs,
+        geometry=chain.geometry,
     )
 
 
