@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import mechanisms
@@ -13,7 +14,8 @@ import fivebar_pin as fb
 from fivebar_pin import JointSpring, Spring
 from fivebar_pin import motion as laws
 from fivebar_pin.balancing import Box, Disc, balance, balance_conditions, realise
-from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.balancing.branches import _alike, branches
+from fivebar_pin.errors import InvalidInputError, SolverError
 
 G = 9.81
 DOWN = (0.0, -G, 0.0)
@@ -249,3 +251,40 @@ def test_torque_that_is_round_off_of_weight_and_springs_is_told_as_none():
     loads = fb.inverse_dynamics(chain, fb.drive(chain, fb.Motion(np.linspace(0.0, 1.0, 50), q, 0.0 * q, 0.0 * q)))
     assert np.abs(loads.torque).max() > 0.0
     assert loads.peak("torque") == 0.0
+
+
+def test_a_damper_whose_ends_never_part_plays_no_part_at_rest():
+    """Its force has no direction, which inverse dynamics refuses; at rest there is none."""
+    chain = lever(Spring("universe", "lever_body", 100.0, 0.0, 2.0))
+    np.testing.assert_array_equal(balance_conditions(chain, "static").offset, 0.0)
+    with pytest.raises(SolverError, match="ends on one point"):
+        resting(chain, np.zeros((1, 1)))
+
+
+def test_conditions_with_springs_are_not_those_without():
+    chain = lever(Spring("high", "arm", 400.0, 0.0))
+    found = balance_conditions(chain, "static", gravity="model")
+    for given, conditions in (
+        (chain.with_springs(()), found),
+        (chain, balance_conditions(lever(), "static", gravity="model")),
+        (chain.with_springs([JointSpring("lever", 1.0, 0.0)]), found),
+    ):
+        with pytest.raises(InvalidInputError, match="must hold the springs of lever"):
+            balance(given, "static", gravity="model", conditions=conditions)
+
+
+def test_a_branch_that_holds_its_springs_asks_less_than_all_of_them_that_do_not():
+    chain = lever(Spring("high", "arm", 400.0, 0.0))
+    found = balance_conditions(chain, "static", gravity="model")
+    assert branches(chain, found, gravity="model") == ()
+    (one,) = branches(chain, replace(found, unheld=1.0), gravity="model")
+    assert one.conditions.equations == found.equations
+
+
+def test_branches_with_other_constants_are_two():
+    soft, hard, again = (
+        balance_conditions(lever(Spring("high", "arm", k, 0.0)), "static", gravity="model")
+        for k in (300.0, 400.0, 400.0)
+    )
+    assert _alike(hard, again)
+    assert not _alike(soft, hard)
