@@ -97,14 +97,14 @@ def _closures_table(console: Console, chain: ClosedChain, proposals: Sequence[Pr
     left = [p for p in proposals if not p.chosen]
     if chosen:
         rows = [
-            (c.name, c.kind.value, " ".join(c.frames), f"{p.gap:.2g}", f"{p.angle:.2g}", p.sure, p.reason)
+            (c.name, c.kind.value, " ".join(c.joins), f"{p.gap:.2g}", f"{p.angle:.2g}", p.sure, p.reason)
             for p in chosen
             for c in (p.closure,)
         ]
         headings = ("closure", "kind", "frames", "gap [m]", "angle [rad]", "sure", "why")
         _tables.table(console, f"closures of {chain.name}", headings, rows)
     if left:
-        rows_left = [(" ".join(p.closure.frames), p.closure.kind.value, p.reason) for p in left[:_MOST_LEFT]]
+        rows_left = [(" ".join(p.closure.joins), p.closure.kind.value, p.reason) for p in left[:_MOST_LEFT]]
         _tables.table(console, "not proposed", ("frames", "kind", "why not"), rows_left)
         if len(left) > _MOST_LEFT:
             console.print(f"  ... and {len(left) - _MOST_LEFT} more")

@@ -98,7 +98,7 @@ def _named_apart(chain: ClosedChain, closures: list[Closure]) -> list[Closure]:
     """Return closures that no two of have one name."""
     taken, out = {c.name for c in chain.closures}, []
     for closure in closures:
-        name = closure.name if closure.name not in taken else f"{closure.frames[0]}~{closure.frames[1]}"
+        name = closure.name if closure.name not in taken else f"{closure.joins[0]}~{closure.joins[1]}"
         taken.add(name)
         out.append(replace(closure, name=name))
     return out

@@ -12,8 +12,8 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
 from fivebar_pin.mechanism import mobility
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.mobility import Site
 from fivebar_pin.mechanism.newton import closed_enough
 
 __all__ = ["Posed", "is_planar", "pose"]
@@ -80,24 +80,24 @@ def _gaps(loops: Loops, q: Array) -> list[float]:
     return [float(np.abs(residual[c.rows]).max()) for c in loops.anchored]
 
 
-def _problems(chain: ClosedChain, loops: Loops, site: Site) -> dict[int, str]:
+def _problems(chain: ClosedChain, loops: Loops, site: Configurations) -> dict[int, str]:
     """Say what is wrong with each closure at a generic configuration."""
     out: dict[int, str] = {}
-    for c in loops.anchored:
-        without = np.array(site.J)
+    for k, c in enumerate(loops.anchored):
+        without = np.array(site.J[0])
         without[c.rows] = 0.0
-        if not c.moved.size or not np.abs(site.J[c.rows]).max(initial=0.0) > _STILL:
-            out[c.index] = "no joint moves the two frames apart: it would hold nothing"
-        elif np.abs(site.free[c.moved]).max(initial=0.0) < _STILL:
-            out[c.index] = f"it would lock {', '.join(_owners(chain, c.moved.tolist()))}"
+        if not c.columns.size or not np.abs(site.J[0][c.rows]).max(initial=0.0) > _STILL:
+            out[k] = "no joint moves the two frames apart: it would hold nothing"
+        elif np.abs(site.free[0][c.columns]).max(initial=0.0) < _STILL:
+            out[k] = f"it would lock {', '.join(_owners(chain, c.columns.tolist()))}"
         elif loops.rank(without) == site.rank:
-            out[c.index] = "it follows from the other closures: it takes no freedom away"
+            out[k] = "it follows from the other closures: it takes no freedom away"
         elif site.rank < loops.r and _is_over(loops, site, c.rows):
-            out[c.index] = _OVER
+            out[k] = _OVER
     return out
 
 
-def _is_over(loops: Loops, site: Site, rows: slice) -> bool:
+def _is_over(loops: Loops, site: Configurations, rows: slice) -> bool:
     """Whether rows of this closure take part in a dependence that holds only where the loops are closed."""
     _, closed = mobility.redundant_combinations(loops, site)
     return bool(np.any(closed[:, rows]))

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, Immutable, checked
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.mechanism import mobility
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.mobility import Site
 
 __all__ = ["MotorProposal", "propose_motors"]
 
@@ -68,7 +68,7 @@ def propose_motors(chain: ClosedChain, q: npt.ArrayLike | None = None) -> tuple[
     single = [j for j in range(1, chain.model.njoints) if chain.model.nvs[j] == 1]
     idle = _idle(loops, site)
     order = sorted((j for j in single if chain.model.idx_vs[j] not in idle), key=lambda j: _unlikely(chain, j))
-    chosen = sorted(_basis(chain, site.free, order))
+    chosen = sorted(_basis(chain, site.free[0], order))
     return tuple(MotorProposal(str(chain.model.names[j]), _reason(chain, j)) for j in chosen)
 
 
@@ -87,10 +87,10 @@ def _basis(chain: ClosedChain, free: Array, order: list[int]) -> list[int]:
     return chosen
 
 
-def _idle(loops: Loops, site: Site) -> set[int]:
+def _idle(loops: Loops, site: Configurations) -> set[int]:
     """Return the coordinates inside a loop that no closure feels in general."""
-    inside = {int(k) for c in loops.anchored for k in c.moved}
-    felt = np.abs(site.J).max(axis=0, initial=0.0) > _STILL
+    inside = {int(k) for c in loops.anchored for k in c.columns}
+    felt = np.abs(site.J[0]).max(axis=0, initial=0.0) > _STILL
     return {k for k in inside if not felt[k]}
 
 

@@ -96,7 +96,7 @@ def propose_closures(
     given = [_given(ends, pair) for pair in pairs]
     tried: list[Candidate] = []
     for found in [given] if given else _in_order(chain, ends, starts):
-        held = {frozenset(c.frames) for c in (*chain.closures, *(one.closure for one in tried))}
+        held = {frozenset(c.joins) for c in (*chain.closures, *(one.closure for one in tried))}
         fresh = [Candidate(chain, pair, starts, wanted) for pair in found if _names(pair) not in held]
         chosen = choose(chain, fresh, starts)
         tried += fresh
