@@ -12,9 +12,10 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
 from fivebar_pin.mechanism import mobility
+from fivebar_pin.mechanism.closing import closed_enough
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.newton import closed_enough
+from fivebar_pin.mechanism.plane import plane_normal
 
 __all__ = ["Posed", "is_planar", "pose"]
 
@@ -23,8 +24,6 @@ _REACHED = 1e-12
 """Residual of a configuration that counts as closed [m or rad, of the chain's length]."""
 _STILL = 1e-8
 """Scaled speed below which a joint counts as standing still [-]."""
-_PARALLEL = 1e-6
-"""Sine of the angle up to which hinges are parallel: what rounding in a file makes of right angles [-]."""
 
 _OVER = "the loop is overconstrained: it closes only with these exact dimensions"
 
@@ -119,10 +118,4 @@ def is_planar(chain: ClosedChain, joints: tuple[int, int]) -> bool:
     q = pin.integrate(chain.model, pin.neutral(chain.model), rng.uniform(-1.0, 1.0, chain.nv))
     moved = np.flatnonzero(loops.tree.support[joints[0]] != loops.tree.support[joints[1]])
     S = loops.tree.poses(q[None]).S[0][:, moved]
-    turns = np.linalg.norm(S[3:], axis=0) > _STILL
-    if not turns.any():
-        return False
-    n = S[3:, turns][:, 0] / np.linalg.norm(S[3:, turns][:, 0])
-    across = np.linalg.norm(np.cross(S[3:, turns].T, n), axis=1).max(initial=0.0)
-    slides = np.abs(n @ S[:3, ~turns]).max(initial=0.0)
-    return bool(across < _PARALLEL and slides < _PARALLEL)
+    return plane_normal(S[None], chain.length) is not None
