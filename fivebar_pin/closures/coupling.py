@@ -117,7 +117,7 @@ class Coupling(Closure, word="coupling"):
         if len(set(joints)) != len(joints):
             raise InvalidInputError("joints of a coupling", joints, "must differ", "Add the ratios of one joint.")
         ratio = values.get("ratio")
-        given = list(ratio) if isinstance(ratio, Iterable) and not isinstance(ratio, str) else [ratio]
+        given: list[Any] = list(ratio) if isinstance(ratio, Iterable) and not isinstance(ratio, str) else [ratio]
         if len(given) != len(joints):
             raise InvalidInputError(
                 "ratio of a coupling", given, f"must hold {len(joints)} numbers, one for each joint"
