@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +29,12 @@ from mechanisms import (
 )
 
 import fivebar_pin as fb
+from fivebar_pin import viz
 from fivebar_pin.closures import ClosureKind
+from fivebar_pin.closures.closure import Entry
+from fivebar_pin.closures.frame_closure import point_drift, point_rows, point_selector
 from fivebar_pin.closures.weld import log3
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import Loops, loops_of
 
 KINDS = ("3d", "6d", "revolute", "cylindrical", "distance")
@@ -275,6 +279,54 @@ def test_a_second_kind_cannot_take_the_word_of_another():
     with pytest.raises(InvalidInputError, match="closure kind 3d = 'Other' but is Point already"):
         type("Other", (fb.closures.FrameClosure,), {"__qualname__": "Other"}, word="3d")
     assert fb.Closure.family["3d"] is fb.closures.Point
+
+
+@pytest.fixture
+def slot():
+    """A kind of one row with a value of its own, defined as a user would, and forgotten afterwards."""
+
+    @dataclass(frozen=True, eq=False)
+    class Slot(fb.closures.FrameClosure, word="slot"):
+        depth: float = 0.0
+        row_names = ("x",)
+        row_units = ("m",)
+        entries = (Entry("depth", None, "a slot needs its depth, e.g. 0.1"),)
+
+        def residual(self, pair):
+            return point_rows(pair)[..., :1] - self.depth
+
+        def selector(self, pair):
+            return point_selector(pair, 3)[..., :1, :]
+
+        def drift(self, pair, V1, V2, A1, A2):
+            return point_drift(pair, V1, V2, A1, A2)[..., :1]
+
+    yield Slot
+    del fb.Closure.family["slot"]
+
+
+def test_a_kind_of_the_users_own_goes_the_whole_road(slot, tmp_path):
+    """Defined in one place it drives, balances its power, is diagnosed, drawn, saved and read."""
+    model = pin.Model()
+    crank = add(model, 0, pin.JointModelRZ(), TILTED, "crank", body(1))
+    yoke = add(model, 0, pin.JointModelPX(), TILTED, "yoke", body(2))
+    names = point(model, yoke, "groove", at()), point(model, crank, "pin", at(0.2))
+    chain = fb.ClosedChain(model, (fb.Closure(names, "SLOT", depth=0.1),), ("crank",))
+    assert type(chain.closures[0]) is slot and slot.kind is fb.ClosureKind.parse("slot")
+    fb.save(chain, tmp_path / "yoke.urdf")
+    again = fb.load(tmp_path / "yoke.urdf")
+    path = fb.drive(again, fb.motion.cycloidal(np.linspace(0.0, 1.0, 51), 0.0, 5.0))
+    np.testing.assert_allclose(path.q[:, 1], 0.2 * np.cos(path.q[:, 0]) - 0.1, rtol=0.0, atol=1e-12)
+    loads = fb.inverse_dynamics(again, path)
+    assert loads.power_residual() < 1e-12 and loads.momentum_residual() < 1e-12
+    assert fb.diagnose(again).ok and fb.balance_conditions(again, "force").rank == 3
+    assert len(viz.page([viz.Shown(again, path)])) > 1e5
+    with pytest.raises(InvalidInputError, match=r"closure groove~pin = 'slot' but has no word in MJCF"):
+        fb.save(again, tmp_path / "yoke.xml")
+    sidecar = tmp_path / "yoke.yaml"
+    sidecar.write_text(re.sub("depth: .*\n", "", sidecar.read_text()))
+    with pytest.raises(FileFormatError, match=r"depth\[0\]: is missing; a slot needs its depth, e.g. 0.1"):
+        fb.load(tmp_path / "yoke.urdf")
 
 
 def test_nothing_outside_the_family_knows_its_kinds():

@@ -40,6 +40,17 @@ def test_it_carries_no_force_along_the_axis_and_no_moment_about_it():
     assert fb.diagnose(chain, q).determinate("pair") == "fx fy fz mx my mz"
 
 
+@pytest.mark.parametrize("kind", ["force", "dynamic"])
+def test_it_has_the_conditions_of_the_explicit_pair(kind):
+    """What a hinge and a slide without mass leave of the conditions on the other bodies: the same rows."""
+    (chain, _), (other, _) = sliding_hinge(), sliding_hinge(explicit=True)
+    one, two = (fb.balance_conditions(c, kind) for c in (chain, other))
+    shared = [two.space.names.index(name) for name in one.space.names]
+    rows = two.reduced[:, shared]
+    assert np.linalg.matrix_rank(rows * one.space.scale, tol=1e-8) == one.rank
+    assert one.angles(rows).max() < 1e-8
+
+
 def test_where_nothing_slides_it_moves_as_a_hinge_does():
     chain, q = planar_sliding()
     hinge = four_bar(kind="revolute").with_gravity(np.array(chain.model.gravity.linear))

@@ -74,6 +74,16 @@ def test_a_rod_is_a_coupler_without_mass(base):
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-11 * np.abs(two).max())
 
 
+@pytest.mark.parametrize("kind", ["force", "dynamic", "static"])
+def test_a_rod_has_the_conditions_of_a_coupler_without_mass(kind):
+    (chain, _), bar = rod_four_bar(), four_bar()
+    one, two = (fb.balance_conditions(c, kind) for c in (chain, bar))
+    shared = [two.space.names.index(name) for name in one.space.names]
+    rows = two.reduced[:, shared]
+    assert np.linalg.matrix_rank(rows * one.space.scale, tol=1e-8) == one.rank
+    assert one.angles(rows).max() < 1e-8
+
+
 def test_the_force_is_along_the_rod_and_every_component_is_determinate():
     chain, q = spatial_rod()
     path = fb.drive(chain, fb.motion.cycloidal(np.linspace(0.0, 1.0, 21), 0.3, 0.8), near=q)
