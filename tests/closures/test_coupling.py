@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from mechanisms import TILTED, add, at, body, five_bar, parallelogram, point
 from tied_chains import PLANET, RING, SUN, geared_five_bar, planetary_train, rack_and_pinion
 
@@ -82,6 +84,34 @@ def test_a_geared_pair_has_the_inertia_of_one_shaft(joint):
 
 def _bodies(chain: fb.ClosedChain) -> list[pin.Inertia]:
     return list(chain.model.inertias)[1:]
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(data=st.data())
+def test_any_train_of_wheels_moves_as_its_ratios_and_inertias_say(data):
+    """Wheels on fixed shafts tied by random rows C q = c: I a = tau + C^T f, C a = 0, against linear algebra."""
+    n = data.draw(st.integers(2, 6), label="wheels")
+    r = data.draw(st.integers(1, n - 1), label="rows")
+    rng = np.random.default_rng(data.draw(st.integers(0, 10**6), label="seed"))
+    C = rng.uniform(0.3, 4.0, (r, n)) * rng.choice([-1.0, 1.0], (r, n)) * (rng.random((r, n)) < 0.7)
+    C[np.arange(r), np.arange(r)] = rng.uniform(1.0, 3.0, r)
+    c, inertia = rng.normal(size=r), rng.uniform(0.1, 2.0, n)
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    for k in range(n):
+        wheel = pin.Inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, inertia[k]]))
+        add(model, 0, pin.JointModelRUBZ() if k % 2 else pin.JointModelRZ(), at(float(k)), f"w{k}", wheel)
+    rows = [Coupling({f"w{k}": C[i, k] for k in range(n) if C[i, k]}, c[i], name=f"row{i}") for i in range(r)]
+    chain = fb.ClosedChain(model, rows, tuple(f"w{k}" for k in range(n)))
+    used = [k for k in range(n) if f"w{k}" in {name for row in rows for name in row.ratios} or not k % 2]
+    free = np.linalg.svd(C)[2][np.linalg.matrix_rank(C, tol=1e-9) :].T
+    assume(np.linalg.cond(C) < 1e4 and len(used) == n)
+    q, v, tau = np.linalg.lstsq(C, c, rcond=None)[0], free @ rng.normal(size=n - r), rng.normal(size=n)
+    Ct = C / inertia
+    f = np.linalg.solve(C @ Ct.T, -Ct @ tau)
+    a = fb.forward_dynamics(chain, q, v, tau)
+    np.testing.assert_allclose(a, (tau + C.T @ f) / inertia, rtol=0.0, atol=1e-11 * np.abs(tau).max() / inertia.min())
+    assert fb.diagnose(chain, q).mobility == n - r
 
 
 def test_the_transmitted_torque_is_in_the_joints_as_a_motor_is():

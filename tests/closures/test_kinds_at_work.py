@@ -103,6 +103,18 @@ def test_the_joints_carry_what_the_bodies_need(name):
 
 
 @NAMES
+def test_regressors_give_the_loads(name):
+    """Torque and reactions are matrices times the inertial parameters, whatever closes the loops."""
+    chain, path = moved(name)
+    loads = fb.inverse_dynamics(chain, path)
+    for quantity in ("torque", "joint_reactions", "closure_reactions", "shaking_moment"):
+        direct = np.asarray(getattr(loads, quantity)).reshape(len(path), -1)
+        own = fb.balancing.regressor(chain, path, quantity)(chain.inertial_parameters)
+        scale = np.abs(np.nan_to_num(direct)).max(initial=1e-3)
+        np.testing.assert_allclose(own, direct, rtol=0.0, atol=1e-10 * scale, err_msg=quantity)
+
+
+@NAMES
 def test_the_diagnosis_finds_one_freedom_and_nothing_wrong(name):
     chain, path = moved(name)
     found = fb.diagnose(chain, path.q[0])
