@@ -343,8 +343,10 @@ def test_joints_of_a_coupling_count_their_turns(joint):
     """A joint of cosine and sine becomes a revolute one about the same axis; the rest of the model stays."""
     free = five_bar(base=TILTED, joint=joint).model
     free.referenceConfigurations["home"] = pin.integrate(free, pin.neutral(free), np.array([0.3, -0.4, 2.0, 0.1]))
-    free.armature = np.array([0.1, 0.2, 0.3, 0.4])
-    free.damping = np.array([0.5, 0.6, 0.7, 0.8])
+    for k, word in enumerate(OF_VELOCITY):
+        setattr(free, word, 0.1 + k + 0.1 * np.arange(4.0))
+    passive = free.idx_qs[2]
+    free.lowerPositionLimit[passive], free.upperPositionLimit[passive] = -0.7, 0.8
     before = free.nq
     chain = fb.ClosedChain(free, (Coupling({"left": 1.0, "right": 2.0}),), ())
     assert free.nq == before and chain.nq == (4 if joint is pin.JointModelRZ else 6)
@@ -359,8 +361,10 @@ def test_joints_of_a_coupling_count_their_turns(joint):
     assert [f.name for f in model.frames] == [f.name for f in free.frames]
     assert [f.placement for f in model.frames] == [f.placement for f in free.frames]
     assert [f.parentJoint for f in model.frames] == [f.parentJoint for f in free.frames]
-    for word in ("armature", "damping", "upperEffortLimit", "upperVelocityLimit", "lowerDryFrictionLimit"):
+    for word in OF_VELOCITY:
         np.testing.assert_array_equal(getattr(model, word), getattr(free, word), err_msg=word)
+    kept = model.idx_qs[2]
+    assert (model.lowerPositionLimit[kept], model.upperPositionLimit[kept]) == (-0.7, 0.8)
     assert model.gravity == free.gravity and model.name == free.name
     oblique = pin.buildModelFromXML(OBLIQUE)
     turned = fb.ClosedChain(oblique, (Coupling({"j": 1.0}),), ()).model
@@ -372,6 +376,11 @@ def test_joints_of_a_coupling_count_their_turns(joint):
     limits = turned.lowerPositionLimit[0], turned.upperPositionLimit[0]
     assert limits[0] < -1e300 and limits[1] > 1e300
 
+
+OF_VELOCITY = (
+    "armature", "damping", "rotorGearRatio", "rotorInertia", "lowerDryFrictionLimit", "upperDryFrictionLimit",
+    "lowerEffortLimit", "upperEffortLimit", "lowerVelocityLimit", "upperVelocityLimit",
+)  # fmt: skip
 
 OBLIQUE = """<robot name="one"><link name="a"/><link name="b"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j" type="continuous">

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tied_chains import EXAMPLES
+from tied_chains import EXAMPLES, OFFSET, RATIO
 
 import fivebar_pin as fb
 from fivebar_pin import viz
@@ -122,6 +124,38 @@ def test_the_diagnosis_finds_one_freedom_and_nothing_wrong(name):
     assert found.mobility == found.generic_mobility == 1
     assert found.actuation.name == "EXACT"
     assert found.gap < 1e-12
+
+
+CHANGED = {
+    "length": lambda name: fb.closures.Distance(("crank_end", "rocker_end"), 1.15, name=name),
+    "ratio": lambda name: fb.closures.Coupling({"left": 2.6, "right": 1.0}, OFFSET, name=name),
+    "offset": lambda name: fb.closures.Coupling({"left": RATIO, "right": 1.0}, 1.5, name=name),
+    "joint": lambda name: fb.closures.Coupling({"left": RATIO, "right_elbow": 1.0}, OFFSET, name=name),
+    "axis": lambda name: fb.closures.Cylindrical(("sleeve", "shaft"), (0.0, 0.1, 1.0), name=name),
+    "kind": lambda name: fb.closures.Revolute(("sleeve", "shaft"), name=name),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        ("rod four-bar", "length"),
+        ("geared five-bar", "ratio"),
+        ("geared five-bar", "offset"),
+        ("geared five-bar", "joint"),
+        ("sliding hinge", "axis"),
+        ("sliding hinge", "kind"),
+    ],
+)
+def test_conditions_of_another_closure_are_refused(name, what):
+    chain, _ = EXAMPLES[name]()
+    last = chain.closures[-1]
+    conditions = fb.balance_conditions(chain, "force")
+    heavier = chain.with_inertial_parameters(2.0 * chain.inertial_parameters)
+    assert fb.balancing.balance_problem(heavier, "force", conditions=conditions).conditions is conditions
+    other = replace(chain, closures=(*chain.closures[:-1], CHANGED[what](last.name)))
+    with pytest.raises(fb.FiveBarPinError, match="must belong to"):
+        fb.balancing.balance_problem(other, "force", conditions=conditions)
 
 
 @NAMES
