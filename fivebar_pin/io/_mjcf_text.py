@@ -20,10 +20,9 @@ from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
 from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
-from fivebar_pin.io._mjcf_springs import joint_springs_to_write
+from fivebar_pin.io._mjcf_springs import joint_springs_to_write, tendon_lines
 from fivebar_pin.io._outline import outline
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
-from fivebar_pin.springs import Spring
 
 __all__ = ["mjcf_text"]
 
@@ -58,7 +57,7 @@ class _Writer:
         self.sites = {j.child for j in self.tree.joints.values() if j.kind == "fixed"}
 
     def text(self) -> str:
-        equality, tendons = self.equality(), self.tendons()
+        equality, tendons = self.equality(), tendon_lines(self.chain, self.site)
         bodies = self.contents(self.tree.root, "    ")
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
@@ -176,17 +175,6 @@ class _Writer:
                 ends = [self.second_site(name, offset) for name in closure.frames]
                 lines.append(_closure("connect", f"{closure.name} axis", ends))
                 self.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
-        return lines
-
-    def tendons(self) -> list[str]:
-        lines = []
-        for spring in self.chain.springs:
-            if isinstance(spring, Spring):
-                words = f'stiffness="{numbers([spring.stiffness])}" springlength="{numbers([spring.length])}"'
-                if spring.damping:
-                    words += f' damping="{numbers([spring.damping])}"'
-                ends = "".join(f"<site site={quoteattr(self.site(f))}/>" for f in (spring.frame1, spring.frame2))
-                lines.append(f"    <spatial {words}>{ends}</spatial>")
         return lines
 
     def pose(self, frame: str) -> tuple[str, Array]:
