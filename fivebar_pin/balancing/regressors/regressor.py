@@ -81,7 +81,8 @@ def regressor(
         chain: the mechanism; its present inertial parameters play no part.
         trajectory: of this chain.
         quantity: one of `QUANTITIES`: linear_momentum, angular_momentum, shaking_force, shaking_moment, frame_force,
-            frame_moment (3 rows each), torque, gravity_torque (na rows), potential_energy, kinetic_energy (1 row),
+            frame_moment (3 rows each), torque, gravity_torque (na rows, the weight's alone: springs are in torque),
+            potential_energy, kinetic_energy (1 row),
             joint_reactions (6 rows per body), closure_reactions (6 rows per closure). Signs, axes and meaning are
             those of `inverse_dynamics`: the rotors (armature) are in the torque alone.
         about: point that angular momentum, shaking and frame moment refer to (3,) [m], world.
