@@ -177,6 +177,7 @@ def specimens() -> tuple[object, ...]:
         paper.audit_table_1(),
         paper.errata(),
         loads.reactions,
+        fb.frame_motion(chain, trajectory, "coupler_end"),
     )
     return (
         *(chain, motion, trajectory, loads, free, energy, linkage, five, solution, problem, design, none, front, score),

@@ -100,7 +100,7 @@ def _initial_state(system: EquationsOfMotion, q: Array, v: Array, initial: str) 
     """Return the state brought to round-off, once it is consistent or asked to be made so."""
     manifold = system.manifold
     if initial == "check":
-        require_consistent(system, manifold.at(np.array(q[None])), v[None])
+        require_consistent(manifold.at(np.array(q[None])), v[None])
     point = manifold.project(q, 1e-12)
     rank = manifold.rank_of(point)
     if rank == system.chain.nv:

@@ -470,7 +470,3 @@ def test_one_sample_is_enough():
     one = Motion(np.array([0.5]), np.array([[2.0, 1.0]]), np.array([[1.0, -2.0]]), np.array([[3.0, 0.5]]))
     trajectory = fb.drive(chain, one)
     assert (len(trajectory), trajectory.q.shape, trajectory.N.shape) == (1, (1, 4), (1, 4, 2))
-
-
-def test_branch_errors_are_assembly_errors():
-    assert issubclass(BranchError, AssemblyError)

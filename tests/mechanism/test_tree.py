@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import add, at, body, double_four_bar, five_bar, rscr, slider_crank
 
+import fivebar_pin as fb
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import Bodies, accelerations, body_rates, total_centre
 from fivebar_pin.mechanism.tree import Tree, motion_cross
@@ -176,3 +180,19 @@ def test_support_lists_the_joints_that_move_a_body(chain):
         for i in list(model.supports[j])[1:]:
             moving |= set(range(model.idx_vs[i], model.idx_vs[i] + model.joints[i].nv))
         assert set(np.flatnonzero(tree.support[j])) == moving
+
+
+def test_threads_do_not_share_a_workspace():
+    """Each asks for its own configurations, a few at a time, so that Pinocchio's road is taken."""
+    chain = five_bar()
+    rng = np.random.default_rng(8)
+    batches = rng.uniform(-np.pi, np.pi, (4, 300, 2, chain.nq))
+    alone = [[fb.closure_residual(chain, q) for q in batch] for batch in batches]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            together = list(pool.map(lambda batch: [fb.closure_residual(chain, q) for q in batch], batches))
+    finally:
+        sys.setswitchinterval(before)
+    np.testing.assert_array_equal(np.array(together), np.array(alone))
