@@ -25,7 +25,7 @@ from mechanisms import (
 import fivebar_pin as fb
 from fivebar_pin import Motion, paper
 from fivebar_pin import motion as laws
-from fivebar_pin.errors import AssemblyError, BranchError, InvalidInputError, SingularityError
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.mechanism.loops import loops_of
 
 
