@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, lazy
 from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.passive import PassiveMap
@@ -29,52 +28,52 @@ class Configurations:
     loops: Loops
     q: Array
 
-    @cached_property
+    @lazy
     def poses(self) -> Poses:
         """Poses of the joints."""
         return self.loops.tree.poses(self.q)
 
-    @cached_property
+    @lazy
     def pairs(self) -> list[FramePair]:
         """World poses of the frames of every closure."""
         return self.loops.pairs(self.poses)
 
-    @cached_property
+    @lazy
     def residual(self) -> Array:
         """All closure rows (n, m) [m, rad]."""
         return self.loops.residual(self.pairs) if self.loops.m else np.zeros((self.q.shape[0], 0))
 
-    @cached_property
+    @lazy
     def gap(self) -> Array:
         """Largest of them (n,) [m or rad]."""
         return np.asarray(np.abs(self.residual).max(axis=1, initial=0.0))
 
-    @cached_property
+    @lazy
     def reduced(self) -> Array:
         """Independent combinations of the closure rows, scaled (n, r)."""
         return np.asarray(self.residual @ self.loops.reduce.T)
 
-    @cached_property
+    @lazy
     def blocks(self) -> list[Array]:
         """The closure Jacobian per independent group of closures."""
         return self.loops.blocks(self.poses, self.pairs)
 
-    @cached_property
+    @lazy
     def J(self) -> Array:
         """The closure Jacobian (n, m, nv)."""
         return self.loops.joined(self.blocks, self.q.shape[0])
 
-    @cached_property
+    @lazy
     def passive(self) -> PassiveMap:
         """What takes the actuated coordinates to the passive ones."""
         return self.loops.passive_map(self.blocks)
 
-    @cached_property
+    @lazy
     def independent(self) -> Decomposed:
         """The Jacobian of the independent combinations of rows, scaled and decomposed."""
         return Decomposed.of(np.matmul(self.loops.reduce, self.J) * self.loops.column_scale)
 
-    @cached_property
+    @lazy
     def whole(self) -> Decomposed:
         """The Jacobian of all rows, scaled and decomposed."""
         return Decomposed.of(self.loops.scaled(self.J))
