@@ -10,8 +10,9 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, finite
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
-from fivebar_pin.kinematics.assemble import CLOSED, assemble
+from fivebar_pin.kinematics.assemble import assemble
 from fivebar_pin.kinematics.branch import track
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.mechanism.complement import rates_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of

@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.kinematics.assemble import CLOSED, checked_search, closed_from_starts
+from fivebar_pin.kinematics.assemble import checked_search, closed_from_starts
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.tree import Poses
 

@@ -26,6 +26,7 @@ __all__ = [
     "RANK_TOLERANCE",
     "SINGULAR",
     "TIED",
+    "UNDRIVEN",
     "Decomposed",
     "Factored",
     "factored",
@@ -34,6 +35,7 @@ __all__ = [
     "ranks_of",
     "same_side",
     "singular_values",
+    "smallest_values",
     "truncated_inverse",
 ]
 
@@ -59,6 +61,11 @@ HELD = 1e-6
 """Singular value of the passive columns down to which the motors still hold the mechanism for certain [-].
 
 Ten times the one at which they do not, so that samples taken above it can be driven.
+"""
+UNDRIVEN = 1e-12
+"""Singular value of the motors' part of the tangent below which they do not determine a simulated motion at all [-].
+
+A simulation does not need the motors to determine it: all that it can say of its motors is said, down to round-off.
 """
 BRANCHING = 1e-3
 """Singular value of all columns below which two branches of a mechanism are too near to be told apart on a walk [-].
@@ -197,6 +204,11 @@ def singular_values(J: Array) -> Array:
     if 0 in J.shape:
         return np.zeros(0)
     return np.asarray(np.linalg.svd(J, compute_uv=False) if J.size < _WHOLE else block_svd(J)[1])
+
+
+def smallest_values(M: Array) -> Array:
+    """Return the smallest singular values of a batch of matrices (n, k, f) -> (n,)."""
+    return np.asarray(np.linalg.svd(M, compute_uv=False)[:, -1])
 
 
 def truncated_inverse(J: Array) -> Array:
