@@ -9,6 +9,7 @@ import numpy as np
 from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.errors import AssemblyError, BranchError, SingularityError
 from fivebar_pin.mechanism.closing import Closed, closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
 from fivebar_pin.mechanism.rank import SINGULAR, same_side
 
@@ -55,16 +56,12 @@ class _Corrector:
 
 
 def _correct(loops: Loops, q: Array) -> _Corrector:
-    poses = loops.tree.poses(q)
-    pairs = loops.pairs(poses)
-    blocks = loops.blocks(poses, pairs)
-    passive = loops.passive_map(blocks)
-    residual = loops.residual(pairs) if loops.m else np.zeros((1, 0))
-    error = float(np.abs(residual * loops.row_scale).max(initial=0.0))
+    here = Configurations(loops, q)
+    passive = here.passive
     return _Corrector(
-        error,
-        -passive.solve(residual)[0],
-        passive.complement(blocks)[0],
+        float(here.error[0]),
+        -passive.solve(here.residual)[0],
+        passive.complement(here.blocks)[0],
         passive.sign[0],
         [A[0] for A in passive.tall],
         float(passive.sigma[0]),
@@ -197,8 +194,7 @@ def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, toleran
 
 def _on_the_side_of(loops: Loops, nodes: list[_Node], which: np.ndarray, q: Array) -> np.ndarray:
     """Tell whether every sample q (n, nq) lies on the side of its node where no determinant tells it (n,)."""
-    poses = loops.tree.poses(q)
-    tall = loops.passive_map(loops.blocks(poses, loops.pairs(poses))).tall
+    tall = Configurations(loops, q).passive.tall
     return same_side([np.stack([node.tall[g] for node in nodes])[which] for g in range(len(tall))], tall)
 
 

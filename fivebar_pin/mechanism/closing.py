@@ -148,7 +148,7 @@ class _Passive:
         step[finished | lost] = 0.0
         self.size[which[lost]] = np.inf
         self.correction[which] += np.abs(step / loops.column_scale[loops.passive]).max(axis=1, initial=0.0)
-        self._last[which] = np.abs(here.residual * loops.row_scale).max(axis=1, initial=0.0) < _POLISHED
+        self._last[which] = here.error < _POLISHED
         q = loops.tree.integrate(here.q, _spread(loops, step, loops.passive))
         return q, np.isfinite(self.size[which]) & (self.correction[which] < _ASTRAY)
 

@@ -10,7 +10,7 @@ from fivebar_pin._arrays import Array, lazy
 from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.passive import PassiveMap
-from fivebar_pin.mechanism.rank import Decomposed
+from fivebar_pin.mechanism.rank import Decomposed, Factored, factored
 from fivebar_pin.mechanism.tree import Poses
 
 __all__ = ["Configurations"]
@@ -66,7 +66,19 @@ class Configurations:
     @lazy
     def passive(self) -> PassiveMap:
         """What takes the actuated coordinates to the passive ones."""
-        return self.loops.passive_map(self.blocks)
+        return self.loops.passive_map(self.blocks, self.q.shape[0])
+
+    @property
+    def error(self) -> Array:
+        """Largest scaled closure row (n,) [-]."""
+        return np.asarray(np.abs(self.residual * self.loops.row_scale).max(axis=1, initial=0.0))
+
+    @lazy
+    def factored(self) -> Factored:
+        """The same as `independent` where the actuated joints tell the mobility, cheaper."""
+        loops = self.loops
+        J = np.matmul(loops.reduce, self.J) * loops.column_scale
+        return factored(J, loops.tree.nv - loops.actuated.size)
 
     @lazy
     def independent(self) -> Decomposed:
