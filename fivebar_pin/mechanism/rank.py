@@ -180,18 +180,22 @@ class Factored:
 
 def factored(J: Array, rank: int) -> Factored:
     """Factorise scaled Jacobians (n, m, nv) of a rank: by Q R when it is that of all rows."""
-    if J.shape[1] == rank:
+    n, m, nv = J.shape
+    if not m:
+        T = np.broadcast_to(np.eye(nv), (n, nv, nv))
+        return Factored(T, np.zeros((n, nv, 0)), np.ones(n), np.zeros(n))
+    if m == rank:
         Q, R = np.linalg.qr(np.swapaxes(J, 1, 2), mode="complete")
         X, _ = inverse(np.swapaxes(R[:, :rank], 1, 2))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             sigma = 1.0 / np.sqrt(np.einsum("nij,nij->n", X, X))
             back = np.matmul(Q[:, :, :rank], X)
-        return Factored(Q[:, :, rank:], back, np.where(np.isfinite(sigma), sigma, 0.0), np.zeros(J.shape[0]))
+        return Factored(Q[:, :, rank:], back, np.where(np.isfinite(sigma), sigma, 0.0), np.zeros(n))
     U, s, Vt = np.linalg.svd(J)  # rows that depend on each other wherever the loops are closed
     V = np.swapaxes(Vt, 1, 2)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         back = np.matmul(V[:, :, :rank] / s[:, None, :rank], np.swapaxes(U[:, :, :rank], 1, 2))
-    return Factored(V[:, :, rank:], back, s[:, rank - 1] if rank else np.ones(J.shape[0]), s[:, rank])
+    return Factored(V[:, :, rank:], back, s[:, rank - 1] if rank else np.ones(n), s[:, rank])
 
 
 def ranks_of(s: Array) -> npt.NDArray[np.intp]:
