@@ -202,6 +202,7 @@ def specimens() -> tuple[object, ...]:
         loads.reactions,
         fb.diagnosis.propose_closures(fb.ClosedChain(five.model, (), ())),
         fb.diagnosis.propose_motors(five),
+        fb.frame_motion(chain, trajectory, "coupler_end"),
     )
     bodies = (fb.chain.BarBody(("a", "b"), 0.5), fb.chain.LumpBody(("a",), 1.0))
     plate = fb.chain.PlateBody(("a", "b", "c"), 2700.0, 0.01)

@@ -75,6 +75,16 @@ class Loads(Immutable):
         """Closure forces and joint reactions; components that the model leaves open are nan."""
         return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external)
 
+    def torque_of(self, joint: str) -> Array:
+        """Return the torque of one actuated joint (n,) [N m or N].
+
+        Raises:
+            UnknownNameError: it is not one of the actuated joints.
+        """
+        if joint not in self.chain.actuated:
+            raise UnknownNameError("actuated joint", joint, self.chain.actuated)
+        return self.torque[:, self.chain.actuated.index(joint)]
+
     @property
     def joint_reactions(self) -> Array:
         """Wrench by the parent on the body of every joint, about the joint origin (n, njoints - 1, 6) [N, N m].
