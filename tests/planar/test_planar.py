@@ -271,6 +271,17 @@ def test_too_many_motors_are_counted_against_the_mobility() -> None:
         made.chain()
 
 
+def test_motors_in_the_wrong_places_are_told_what_they_leave_free() -> None:
+    made = plain("two")
+    made.points(E=(0.1, -0.1), F=(0.4, -0.3))
+    for name, ends in {"first": "AE", "second": "EF", "third": "BF"}.items():
+        made.bar(name, *ends)
+    made.motor("crank", at="A")
+    made.motor("rocker", at="B")
+    with pytest.raises(InvalidInputError, match="do not determine the motion: they leave .*first.* free.*Drive"):
+        made.chain()
+
+
 def test_a_loop_of_motors_is_refused() -> None:
     made = plain()
     for link, at in (("crank", "A"), ("crank", "C"), ("rocker", "D"), ("rocker", "B")):
@@ -323,6 +334,7 @@ def test_lengths_that_do_not_close_name_the_point_and_the_gap() -> None:
         (lambda m: m.plate("x", "A", "D"), InvalidInputError, "three or more"),
         (lambda m: m.points(A=(0, 0)), InvalidInputError, "sketched twice"),
         (lambda m: m.points(Q=(0, 0, 0)), InvalidInputError, r"must be \(2,\)"),
+        (lambda m: m.ground("A"), InvalidInputError, "must be named once"),
         (lambda m: m.ground("Q"), UnknownNameError, "point 'Q'"),
         (lambda m: m.mass("crank", at="D", mass=1.0), UnknownNameError, "point of crank"),
         (lambda m: m.mass("crank", at="A", mass=-1.0), InvalidInputError, "must not be negative"),
