@@ -278,7 +278,7 @@ def test_motors_in_the_wrong_places_are_told_what_they_leave_free() -> None:
         made.bar(name, *ends)
     made.motor("crank", at="A")
     made.motor("rocker", at="B")
-    with pytest.raises(InvalidInputError, match="do not determine the motion: they leave .*first.* free.*Drive"):
+    with pytest.raises(InvalidInputError, match=r"do not determine the motion: they leave .*first.* free.*Drive"):
         made.chain()
 
 
