@@ -20,7 +20,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from fivebar_pin import balancing, io, motion, paper, viz
+    from fivebar_pin import balancing, closures, io, motion, paper, viz
     from fivebar_pin import planar as planar
     from fivebar_pin import shipped as shipped
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
@@ -57,6 +57,7 @@ __all__ = [
     "balance_conditions",
     "balancing",
     "closure_residual",
+    "closures",
     "complement",
     "diagnose",
     "drive",

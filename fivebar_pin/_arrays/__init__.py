@@ -4,10 +4,11 @@ from fivebar_pin._arrays.algebra import block_svd, cross, skew
 from fivebar_pin._arrays.checks import all_of, checked, integer, number, numeric, reals, require_memory
 from fivebar_pin._arrays.immutable import Array, Immutable, frozen, seal
 from fivebar_pin._arrays.results import finite
-from fivebar_pin._arrays.rounding import ROUND_OFF, figures, settled, table_text
+from fivebar_pin._arrays.rounding import ROUND_OFF, TINY, figures, settled, table_text
 
 __all__ = [
     "ROUND_OFF",
+    "TINY",
     "Array",
     "Immutable",
     "all_of",

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, frozen
-from fivebar_pin.balancing._quantities import Motions
-from fivebar_pin.balancing._sampling import SpaceName, closed_at, random_samples
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
+from fivebar_pin.balancing.regressors.measures import Motions
+from fivebar_pin.balancing.sampling import SpaceName, closed_at, random_samples
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import FiveBarPinError
 from fivebar_pin.mechanism.loops import loops_of

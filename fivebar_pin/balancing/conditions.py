@@ -18,15 +18,14 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integer, skew
-from fivebar_pin.balancing._at_rest import held, required_gravity, same_springs, spring_rows, springs_act
-from fivebar_pin.balancing._parameters import Space, plane_axes
-from fivebar_pin.balancing._sampling import Samples, SpaceName, random_samples, space_of
-from fivebar_pin.balancing._state import State
-from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.closures import Closure
+from fivebar_pin.balancing.parameters import Space, plane_axes
+from fivebar_pin.balancing.regressors.body_motion import BodyMotion
+from fivebar_pin.balancing.sampling import Samples, SpaceName, random_samples, space_of
+from fivebar_pin.balancing.static import held, required_gravity, same_springs, spring_rows, springs_act
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.closures import Anchored
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
 
@@ -280,13 +279,12 @@ def _same_mechanism(a: ClosedChain, b: ClosedChain) -> bool:
         M.isApprox(W, _ALIKE) and j == k
         for M, W, j, k in zip(one.jointPlacements, two.jointPlacements, one.joints, two.joints, strict=True)
     )
-    return tree and all(_same_closure(one, c, two, d) for c, d in zip(a.closures, b.closures, strict=True))
+    pairs = zip(loops_of(a).anchored, loops_of(b).anchored, strict=True)
+    return tree and all(_same_closure(c, d) for c, d in pairs)
 
 
-def _same_closure(one: pin.Model, c: Closure, two: pin.Model, d: Closure) -> bool:
-    frames = [(find_frame(one, f), find_frame(two, g)) for f, g in zip(c.frames, d.frames, strict=True)]
-    alike = all(f.parentJoint == g.parentJoint and f.placement.isApprox(g.placement, _ALIKE) for f, g in frames)
-    return alike and c.kind is d.kind and _close(np.asarray(c.axis), np.asarray(d.axis))
+def _same_closure(c: Anchored, d: Anchored) -> bool:
+    return c.closure.kind == d.closure.kind and c.tied == d.tied and _close(c.numbers(), d.numbers())
 
 
 def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Array) -> tuple[Array, Array]:
@@ -297,7 +295,7 @@ def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Arr
     for k in range(chain.na):
         v = samples.N[:, :, k]
         unit = np.abs(v / loops.column_scale).max(axis=1, keepdims=True)
-        Y = State.of(loops, samples.q, v / unit, poses=samples.poses).momentum()
+        Y = BodyMotion.of(loops, samples.q, v / unit, poses=samples.poses).momentum()
         Y = np.swapaxes(Y, 1, 2).reshape(len(samples), 6, -1)
         moment = Y[:, 3:] - np.matmul(skew(about), Y[:, :3])
         force = Y[:, :3] / space.length

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
+from fivebar_pin.chain.counting import counting_turns
 from fivebar_pin.chain.frames import frames_by_name
 from fivebar_pin.chain.parameters import Geometry
 from fivebar_pin.chain.reshape import put_in_place, reshaped
@@ -29,7 +30,9 @@ class ClosedChain(Immutable):
     """An open tree, the closures that make loops of it, the joints that are driven, and the springs.
 
     Args:
-        model: the open tree; copied, the caller's stays untouched.
+        model: the open tree; copied, the caller's stays untouched. A joint that a coupling ties counts its turns: one
+            whose coordinates are a cosine and a sine is stored as an ordinary revolute joint about the same axis,
+            without limits, so that q has one coordinate for it instead of two (`chain.nq`, not `model.nq`, counts).
         closures: loop closures between frames of the tree.
         actuated: names of the driven joints, in the order of all actuated columns; one degree of freedom each.
         name: what reports call the mechanism; the model's name unless given.
@@ -63,6 +66,8 @@ class ClosedChain(Immutable):
         put_in_place(self.model, self.geometry)
         check_tree(self.model)
         check_closures(self.model, self.closures)
+        counted = {name for closure in self.closures for name in closure.counted}
+        object.__setattr__(self, "model", counting_turns(self.model, counted))
         check_actuated(self.model, self.actuated)
         object.__setattr__(self, "springs", checked_springs(self.model, self.springs))
         frames = {f.name for f in self.model.frames} if self.visuals else set()
@@ -71,7 +76,7 @@ class ClosedChain(Immutable):
                 raise UnknownNameError("frame", visual.frame, sorted(frames))
 
     def __repr__(self) -> str:
-        closures = ", ".join(f"{c.name} ({c.kind.value})" for c in self.closures) or "none"
+        closures = ", ".join(f"{c.name} ({c.kind})" for c in self.closures) or "none"
         springs = f"; springs: {', '.join(s.name for s in self.springs)}" if self.springs else ""
         return (
             f"ClosedChain({self.name!r}: {self.model.njoints - 1} joints, nq = {self.nq}, nv = {self.nv}; "
@@ -143,7 +148,7 @@ class ClosedChain(Immutable):
         spans, origin = [], np.array(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
         places = [(model.parents[j], model.jointPlacements[j].translation) for j in range(1, model.njoints)]
         frames = frames_by_name(model) if self.closures else {}
-        ends = [frames[f] for closure in self.closures for f in closure.frames]
+        ends = [frames[f] for closure in self.closures for f in closure.ends]
         for parent, place in [*places, *((f.parentJoint, f.placement.translation) for f in ends)]:
             spans.append(float(np.linalg.norm(place - origin if parent == 0 else place)))
         real = [s for s in spans if s > 0.0]

@@ -18,6 +18,7 @@ from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 
+_SHOWN = 1e-7  # mass of material that is worth a row [of the moving mass]
 _MOST_POINTS = 10_000  # designs on a front; each is a problem to solve
 
 KINDS = ("force", "moment", "dynamic", "static")
@@ -271,7 +272,7 @@ def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]
     rows = [
         [word, c.body, f"{c.mass:.6g}", _place(design, c), _inertia(design, c)]
         for word, c in changes
-        if c.mass > 1e-7 * design.original.mass
+        if c.mass > _SHOWN * design.original.mass
     ]
     title = f"{design.original.name}: {_balance(design)}, {design.status}; moving mass {_gained(design)} kg"
     headings = ("", "body of joint", "mass [kg]", "at [m], joint axes", "inertia about it [kg m2]")

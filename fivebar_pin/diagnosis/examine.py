@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, block_svd, checked, frozen, integer
+from fivebar_pin._arrays import Array, checked, frozen, integer
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin.dynamics.reactions import reactions
-from fivebar_pin.kinematics.branch import SINGULAR
 from fivebar_pin.mechanism import mobility
+from fivebar_pin.mechanism.closing import closed_enough, residual_of
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.mobility import Site
-from fivebar_pin.mechanism.newton import closed_enough, residual_of
+from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "diagnose"]
@@ -48,18 +48,17 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     integer("seed", seed)
     loops = loops_of(chain)
     findings: list[Finding] = []
-    integer("seed", seed)
     start, gap = _start(chain, q, seed, findings)
     here = mobility.site_at(loops, start)
     generic = mobility.generic_site(chain, here, seed, _REACHED) if _is_closed(loops, start) else here
     if q is None and here.rank < generic.rank:
         findings.append(Finding("warning", _jump(chain, here, generic, "the configuration nearest to the neutral one")))
-        here, gap = generic, float(mobility.gap(loops, generic.q[None])[0])
+        here, gap = generic, float(generic.gap[0])
     actuation, undetermined, excess = _actuation(chain, generic)
     sets = mobility.determining_sets(chain, generic if here.rank < generic.rank else here, _SETS)
     redundant = _redundant_rows(loops, here, generic)
-    sigma = mobility.passive_sigma(loops, here.J, loops.actuated)
-    joints, closures = _determinate(chain, here.q)
+    sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
+    joints, closures, multipliers = _determinate(chain, here.q[0])
     findings += _about_mobility(chain, here, generic, redundant)
     findings += _about_actuation(chain, actuation, undetermined, excess, sets, generic)
     findings += _about_singularity(chain, here, generic, actuation, sigma)
@@ -67,14 +66,14 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     findings += _about_inertia(chain, generic)
     return Diagnosis(
         name=chain.name,
-        q=frozen(here.q),
+        q=frozen(here.q[0]),
         gap=gap,
         rows=loops.m,
         rank=here.rank,
         generic_rank=generic.rank,
         mobility=chain.nv - here.rank,
         generic_mobility=chain.nv - generic.rank,
-        singular_values=frozen(loops.singular_values(here.J)),
+        singular_values=frozen(singular_values(loops.scaled(here.J[0]))),
         redundant=redundant,
         actuated=chain.actuated,
         actuation=actuation,
@@ -82,9 +81,10 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         excess=excess,
         actuated_sets=tuple(ActuatedSet(names, value) for names, value in sets),
         sigma=sigma,
-        amplification=_amplification(loops, here.J, sigma),
+        amplification=_amplification(loops, here.J[0], sigma),
         determinate_joints=joints,
         determinate_closures=closures,
+        determinate_rows=multipliers,
         joints=chain.joints,
         closures=tuple(c.name for c in chain.closures),
         springs=tuple(s.name for s in chain.springs),
@@ -135,7 +135,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
     return found, gap
 
 
-def _redundant_rows(loops: Loops, here: Site, generic: Site) -> tuple[RedundantRow, ...]:
+def _redundant_rows(loops: Loops, here: Configurations, generic: Configurations) -> tuple[RedundantRow, ...]:
     names = [(c.name, row) for c in loops.closures for row in c.row_names]
     always, extra = mobility.redundant_combinations(loops, here)
     beyond: str = "here" if here.rank < generic.rank else "closed"
@@ -148,17 +148,17 @@ def _redundant_rows(loops: Loops, here: Site, generic: Site) -> tuple[RedundantR
     return tuple(out)
 
 
-def _actuation(chain: ClosedChain, site: Site) -> tuple[Actuation, tuple[str, ...], int]:
+def _actuation(chain: ClosedChain, site: Configurations) -> tuple[Actuation, tuple[str, ...], int]:
     """Return the verdict, the joints left free when the actuated ones are held, and the number of motors too many."""
     loops = loops_of(chain)
-    Jp = mobility.held(site.J, loops.actuated)
+    Jp = mobility.held(site.J[0], loops.actuated)
     free = int(loops.passive.size - loops.rank(Jp))
     excess = chain.na - (chain.nv - site.rank - free)
     undetermined: tuple[str, ...] = ()
     if free:
-        scaled = (loops.row_scale[:, None] * Jp * loops.column_scale)[:, loops.passive]
-        null = block_svd(scaled)[2][loops.passive.size - free :] if loops.m else np.eye(free)
-        undetermined = _owners(chain, loops.passive[np.abs(null).max(axis=0) > _STILL])
+        scaled = loops.scaled(Jp)[:, loops.passive]
+        loose = Decomposed.of(scaled[None]).tangent(loops.passive.size - free)[0]
+        undetermined = _owners(chain, loops.passive[np.abs(loose).max(axis=1) > _STILL])
     if not chain.na:
         return Actuation.NONE, undetermined, excess
     if free:
@@ -171,28 +171,31 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
         return 0.0
     if sigma == 0.0:
         return float("inf")
-    scaled = loops.row_scale[:, None] * J * loops.column_scale
-    U, s, Vt = block_svd(scaled[:, loops.passive])
-    k = s.size
-    N = Vt[:k].T @ ((U[:, :k].T @ scaled[:, loops.actuated]) / s[:, None])
-    return float(np.abs(N).max())
+    scaled = loops.scaled(J)
+    passive = Decomposed.of(scaled[None][:, :, loops.passive])
+    return float(np.abs(passive.solve(scaled[:, loops.actuated].T, loops.passive.size)).max())
 
 
-def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Return which reaction components of joints and closures are not marked as open."""
+def _determinate(
+    chain: ClosedChain, q: Array
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], tuple[tuple[str, ...], ...]]:
+    """Return which reaction components of joints and closures, and which rows of these, are not marked as open."""
     rest = np.zeros((1, chain.nv))
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
     bare = chain.with_springs(()) if chain.springs else chain  # what is open does not depend on what pulls
     found = reactions(bare, still, rest, np.zeros((1, chain.na)), {})
-    out = []
-    for reaction in (found.joint_local[0], found.closure_local[0]):
-        mask = np.isfinite(reaction)
+    joints, closures = np.isfinite(found.joint_local[0]), np.isfinite(found.closure_local[0])
+    closures[[not c.ends for c in chain.closures]] = False  # a coupling of joints has no wrench
+    for mask in (joints, closures):
         mask.setflags(write=False)
-        out.append(mask)
-    return out[0], out[1]
+    rows = [
+        tuple(name for name, yes in zip(c.closure.row_names, found.determinate_rows[0, c.rows], strict=True) if yes)
+        for c in loops_of(chain).anchored
+    ]
+    return joints, closures, tuple(rows)
 
 
-def _jump(chain: ClosedChain, here: Site, generic: Site, where: str) -> str:
+def _jump(chain: ClosedChain, here: Configurations, generic: Configurations, where: str) -> str:
     return (
         f"{where} is singular: mobility {chain.nv - here.rank} instead of {chain.nv - generic.rank}. Several assembly "
         "modes meet there and the motion can go on along any of them. Start from, and stay at, other configurations."
@@ -200,7 +203,7 @@ def _jump(chain: ClosedChain, here: Site, generic: Site, where: str) -> str:
 
 
 def _about_mobility(
-    chain: ClosedChain, here: Site, generic: Site, redundant: tuple[RedundantRow, ...]
+    chain: ClosedChain, here: Configurations, generic: Configurations, redundant: tuple[RedundantRow, ...]
 ) -> Iterator[Finding]:
     if not chain.closures:
         yield Finding("note", "there are no closures: this is an open tree")
@@ -220,7 +223,7 @@ def _about_mobility(
             "only with these exact dimensions; loosen the closure if that is not meant.",
         )
     for closure, anchored in zip(chain.closures, loops_of(chain).anchored, strict=True):
-        if not anchored.moved.size:
+        if not anchored.columns.size:
             yield Finding("warning", f"closure {closure.name} joins bodies that no joint moves apart: it holds nothing")
 
 
@@ -230,7 +233,7 @@ def _about_actuation(
     undetermined: tuple[str, ...],
     excess: int,
     sets: list[tuple[tuple[str, ...], float]],
-    generic: Site,
+    generic: Configurations,
 ) -> Iterator[Finding]:
     names = ", ".join(chain.actuated)
     way_out = (
@@ -254,7 +257,7 @@ def _about_actuation(
 
 
 def _about_singularity(
-    chain: ClosedChain, here: Site, generic: Site, actuation: Actuation, sigma: float
+    chain: ClosedChain, here: Configurations, generic: Configurations, actuation: Actuation, sigma: float
 ) -> Iterator[Finding]:
     if actuation not in (Actuation.EXACT, Actuation.OVER) or here.rank < generic.rank or sigma >= _NEAR:
         return
@@ -272,11 +275,11 @@ def _about_singularity(
         )
 
 
-def _about_parts(chain: ClosedChain, here: Site, generic: Site) -> Iterator[Finding]:
+def _about_parts(chain: ClosedChain, here: Configurations, generic: Configurations) -> Iterator[Finding]:
     loops, model = loops_of(chain), chain.model
     looped = np.zeros(chain.nv, dtype=np.bool_)
     for anchored in loops.anchored:
-        looped[anchored.moved] = True
+        looped[anchored.columns] = True
     looped[loops.actuated] = True
     loose = _owners(chain, np.flatnonzero(~looped))
     if loose and chain.na:
@@ -293,23 +296,23 @@ def _about_parts(chain: ClosedChain, here: Site, generic: Site) -> Iterator[Find
     if dead:
         yield Finding("note", f"{', '.join(_owners(chain, np.array(dead)))} stands still here (dead point)")
     lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
-    outside = np.flatnonzero((here.q < lower - _CLOSED) | (here.q > upper + _CLOSED))
+    outside = np.flatnonzero((here.q[0] < lower - _CLOSED) | (here.q[0] > upper + _CLOSED))
     if outside.size:
         owners = [j for j in range(1, model.njoints) if np.isin(outside, _columns_q(model, j)).any()]
         names = ", ".join(model.names[j] for j in owners)
         yield Finding("warning", f"the configuration is outside the limits of {names}")
 
 
-def _about_inertia(chain: ClosedChain, site: Site) -> Iterator[Finding]:
-    for severity, text in inertias.inertia_problems(chain, inertias.plane_normal(chain, site)):
+def _about_inertia(chain: ClosedChain, site: Configurations) -> Iterator[Finding]:
+    for severity, text in inertias.inertia_problems(chain, inertias.normals(chain, site)):
         yield Finding("warning" if severity == "warning" else "error", text)
     text = inertias.mass_problem(chain, site)
     if text:
         yield Finding("error", text)
 
 
-def _is_still(site: Site, k: int) -> bool:
-    return bool(np.abs(site.free[k]).max(initial=0.0) < _STILL)
+def _is_still(site: Configurations, k: int) -> bool:
+    return bool(np.abs(site.free[0, k]).max(initial=0.0) < _STILL)
 
 
 def _owners(chain: ClosedChain, columns: npt.NDArray[np.intp]) -> tuple[str, ...]:
@@ -331,7 +334,7 @@ def _parts(chain: ClosedChain) -> list[tuple[str, ...]]:
         return j
 
     links = [(j, int(model.parents[j])) for j in range(1, model.njoints)]
-    links += [anchored.joints for anchored in loops_of(chain).anchored]
+    links += [pair for c in loops_of(chain).anchored for pair in zip(c.tied, c.tied[1:], strict=False)]
     for a, b in links:
         if a and b:
             group[find(a)] = find(b)

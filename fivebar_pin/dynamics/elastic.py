@@ -17,7 +17,7 @@ from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["SpringForces", "body_wrenches", "frame_points", "resting_force", "spring_forces", "wrench_force"]
+__all__ = ["SpringForces", "body_wrenches", "frame_points", "resting_force", "spring_forces"]
 
 _TOGETHER = 1e-12  # distance of a spring's ends that is round-off: they lie on one point [chain lengths]
 
@@ -95,12 +95,6 @@ def frame_points(chain: ClosedChain, loops: Loops, frame: str, poses: Poses) -> 
     j = int(found.parentJoint)
     point = poses.p[j] + np.matmul(poses.R[j], np.array(found.placement.translation))
     return point, poses.S * loops.tree.support[j]
-
-
-def wrench_force(point: Array, J: Array, wrench: Array) -> Array:
-    """Return the generalised force (n, nv) of a wrench (n, 6) at a point (n, 3); J as from `frame_points`."""
-    moment = wrench[:, 3:] + cross(point, wrench[:, :3])
-    return np.asarray(np.einsum("nik,ni->nk", J[:, :3], wrench[:, :3]) + np.einsum("nik,ni->nk", J[:, 3:], moment))
 
 
 def _on_joint(chain: ClosedChain, loops: Loops, spring: JointSpring, q: Array, v: Array) -> SpringForces:

@@ -10,11 +10,12 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, finite, numeric
+from fivebar_pin._arrays import TINY, Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import System, checked_wrench
+from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.mechanism.manifold import Point
+from fivebar_pin.mechanism.configurations import Configurations
 
 __all__ = ["constant_torque", "forward_dynamics", "require_consistent"]
 
@@ -54,7 +55,7 @@ def forward_dynamics(
         SingularityError: q is a bifurcation, where the motion is not determined.
         SolverError: a spring whose ends meet has a force of no direction.
     """
-    system = System.of(chain)
+    system = EquationsOfMotion.of(chain)
     Q = numeric("q", q)
     single = Q.ndim == 1
     Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
@@ -66,7 +67,7 @@ def forward_dynamics(
     T = checked("tau", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na))
     point = system.manifold.at(Q)
     require_consistent(system, point, V)
-    applied = system.wrench_forces(point, checked_wrench(chain, external, n))
+    applied = system.wrench_forces(point, checked_wrenches(chain, external, n))
     applied[:, chain.actuated_index] += T
     a = system.accelerations(point, V, applied, system.manifold.rank_of(point))
     return np.asarray(a[0]) if single else a
@@ -78,7 +79,7 @@ def constant_torque(chain: ClosedChain, tau: npt.ArrayLike | None) -> Array:
     return given.reshape(1) if given.ndim == 0 and chain.na == 1 else given
 
 
-def require_consistent(system: System, point: Point, v: Array) -> None:
+def require_consistent(system: EquationsOfMotion, point: Configurations, v: Array) -> None:
     loops, scale = system.manifold.loops, system.manifold.scale
     if not loops.m:
         return
@@ -93,8 +94,8 @@ def require_consistent(system: System, point: Point, v: Array) -> None:
             "Use assemble, or simulate(initial='project').",
         )
     u = v / scale
-    rate = np.abs(point.s * np.einsum("nrk,nk->nr", point.Vt[:, : point.s.shape[1]], u)).max(axis=1)
-    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), 1e-300)
+    rate = point.independent.rate(u)
+    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), TINY)
     worst = int(np.argmax(rate - bound))
     if rate[worst] > bound[worst]:
         raise InvalidInputError(

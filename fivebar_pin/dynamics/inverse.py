@@ -23,7 +23,7 @@ from fivebar_pin.dynamics.elastic import spring_forces
 from fivebar_pin.dynamics.loads import Loads
 from fivebar_pin.dynamics.losses import friction_torque
 from fivebar_pin.dynamics.recursion import hanging_tree
-from fivebar_pin.dynamics.wrenches import about_point, applied_wrenches, checked_wrenches
+from fivebar_pin.dynamics.wrenches import about_point, checked_wrenches, moved_to_origin
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.trajectory import Trajectory
 
@@ -76,9 +76,11 @@ def inverse_dynamics(
         poses = loops.tree.poses(trajectory.q)
         tree_torque -= spring_forces(chain, loops, trajectory.q, trajectory.v, poses).force
     if applied:
-        generalised, total = applied_wrenches(chain, trajectory, applied)
-        tree_torque -= generalised
-        carried += total
+        tree = loops_of(chain).tree
+        poses = tree.poses(trajectory.q)
+        acting = moved_to_origin(chain, poses, applied)
+        tree_torque -= np.sum(acting.torques(tree, poses), axis=0)
+        carried += acting.total
     torque = np.matmul(np.swapaxes(trajectory.N, 1, 2), tree_torque[..., None])[..., 0]
     frame = shaking + carried
     return Loads(

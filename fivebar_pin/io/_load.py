@@ -54,7 +54,7 @@ def load(
             has this name.
     """
     where = _named(as_path(path))
-    file = _mechanism_file(where)
+    file = mechanism_file(where)
     given_closures = None if closures is None else _closures(closures)
     given_actuated = None if actuated is None else _names(actuated)
     if file.suffix.lower() == ".xml":
@@ -98,7 +98,7 @@ def _named(path: Path) -> Path:
     return shipped_path(path.name)
 
 
-def _mechanism_file(path: Path) -> Path:
+def mechanism_file(path: Path) -> Path:
     """Return the URDF or MJCF file that `path` means."""
     try:
         is_folder, exists = path.is_dir(), path.exists()
@@ -128,7 +128,8 @@ def _in_folder(folder: Path, endings: tuple[str, ...]) -> list[Path]:
         raise FileFormatError(folder, f"cannot be listed ({error.strerror or error})") from error
 
 
-def _sidecar_file(urdf: Path) -> Path | None:
+def sidecar_file(urdf: Path) -> Path | None:
+    """Return the sidecar that is read with a URDF: of the same name, or the only one of a folder with one URDF."""
     beside = _in_folder(urdf.parent, (".yaml", ".yml"))
     same = [f for f in beside if f.stem == urdf.stem]
     if len(same) > 1:
@@ -147,7 +148,7 @@ def _load_urdf(
     max_bytes: int,
 ) -> ClosedChain:
     tree = read_urdf(urdf, max_bytes=max_bytes)
-    beside = _sidecar_file(urdf)
+    beside = sidecar_file(urdf)
     if beside is None and (closures is None or actuated is None):
         raise FileFormatError(
             urdf,
@@ -199,22 +200,20 @@ def make_chain(
 
 
 def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
-    """Refuse closure frames that do not exist, are ambiguous (a link's name never is), or lie on one body."""
+    """Refuse closures that do not fit the model, or name frames that are ambiguous (a link's name never is)."""
     frames: dict[str, list[pin.Frame]] = {}
     named = frames_by_name(model) if closures else {}
     for frame in model.frames:
         frames.setdefault(frame.name, []).append(frame)
     for k, closure in enumerate(closures):
-        for name in closure.frames:
-            if name not in frames:
-                raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, frames)}")
+        try:
+            closure.check(model, named)
+        except FiveBarPinError as error:
+            raise FileFormatError(file, f"{key}[{k}]: {error}") from error
+        for name in closure.ends:
             same = [f for f in frames[name] if f.type not in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)]
             if len(same) > 1:
                 raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
-        joints = [named[name].parentJoint for name in closure.frames]
-        if joints[0] == joints[1]:
-            body = model.names[joints[0]]
-            raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")
 
 
 def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Path) -> None:

@@ -32,8 +32,10 @@ def tendon_springs(
     springs = []
     for k, element in enumerate(root.findall("tendon/*")):
         where = f"{element.tag} {element.get('name', str(k))!r}"
+        if element.tag == "fixed":
+            continue  # it couples joints, see `_mjcf_equality`
         if element.tag != "spatial":
-            raise reader.fail(where, "is not supported: only spatial tendons between two sites, as springs; remove it")
+            raise reader.fail(where, str(UnknownNameError("tendon", element.tag, ("fixed", "spatial"))))
         full = reader.with_defaults(ElementTree.Element("tendon", element.attrib), None)
         _check_spring_alone(reader, full, where)
         (stiffness,), (damping,) = (reader.numbers(full, w, 1, where, [0.0]) for w in ("stiffness", "damping"))

@@ -8,14 +8,14 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import AssemblyError, BranchError, SingularityError
-from fivebar_pin.mechanism.loops import Loops, open_message, same_side
-from fivebar_pin.mechanism.newton import Closed, closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.closing import Closed, closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.loops import Loops, open_message
+from fivebar_pin.mechanism.rank import SINGULAR, same_side
 
-__all__ = ["LONGEST", "SINGULAR", "follow", "node_at", "track"]
+__all__ = ["LONGEST", "follow", "node_at", "track"]
 
 
 LONGEST = 0.4  # longest predictor step of any coordinate [rad, or chain lengths]
-SINGULAR = 1e-7  # scaled smallest singular value below which the passive motion counts as undetermined [-]
 _SHORTEST = 1e-7  # fraction of a step below which the search for a way on is given up
 _TRUST = 0.3  # largest correction, as a fraction of the step that was predicted
 _DROP = 0.2  # part of the singular value that a step must leave: a longer one may jump over a bifurcation unseen [-]

@@ -14,8 +14,9 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, SingularityError
-from fivebar_pin.kinematics.branch import SINGULAR
-from fivebar_pin.mechanism.loops import Loops, PassiveMap, loops_of
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.passive import PassiveMap
+from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = ["complement", "require_regular", "whole_complement"]
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.dynamics.equations import System
-from fivebar_pin.mechanism.manifold import Point
+from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.simulation.chart_motion import ChartMotion, Node, between, failure, sigma_of
 from fivebar_pin.simulation.singular_step import lagrange
 from fivebar_pin.trajectory import Trajectory
@@ -27,13 +27,13 @@ _DETERMINED = 1e-12  # scaled slope of the actuated joints below which they do n
 class Record:
     """The output samples, filled as the integration passes them."""
 
-    def __init__(self, system: System, times: Array) -> None:
+    def __init__(self, system: EquationsOfMotion, times: Array) -> None:
         n, chain = times.size, system.chain
         self.system, self.times, self.done = system, times, 0
         self.q, self.v, self.a = np.empty((n, chain.nq)), np.empty((n, chain.nv)), np.empty((n, chain.nv))
         self.residual = np.zeros(n)
 
-    def put(self, k: int, point: Point, v: Array, a: Array) -> None:
+    def put(self, k: int, point: Configurations, v: Array, a: Array) -> None:
         self.q[k], self.v[k], self.a[k] = point.q[0], v, a
         self.residual[k] = np.abs(point.residual).max(initial=0.0)
         self.done = k + 1
@@ -83,7 +83,7 @@ class _Across:
             raise failure(node, motion.rank, "the configuration is not determined over a whole step")
         self.times, self.rows = np.array(times), np.array(rows)
 
-    def at(self, t: float) -> tuple[Point, Array, Array]:
+    def at(self, t: float) -> tuple[Configurations, Array, Array]:
         """Return point, v (nv,) and a (nv,) at a time."""
         manifold, B = self.motion.system.manifold, self.motion.chart.B
         dq, v, a = np.split(lagrange(np.array((t - self.node.t) / self.h), self.times) @ self.rows, 3)
@@ -94,7 +94,7 @@ class _Across:
         return manifold.project(q, 1e-12), v, a
 
 
-def _complement(system: System, q: Array, rank: int) -> Array:
+def _complement(system: EquationsOfMotion, q: Array, rank: int) -> Array:
     """Return N (n, nv, na) of the actuated joints; nan where they do not determine the motion.
 
     With more motors than mobility, N is the one of least torque: N^T distributes a load over the motors with the
@@ -104,7 +104,7 @@ def _complement(system: System, q: Array, rank: int) -> Array:
     N = np.full((q.shape[0], chain.nv, chain.na), np.nan)
     if chain.na < chain.nv - rank or not chain.na:
         return N
-    T = np.swapaxes(system.manifold.at(q).Vt[:, rank:], 1, 2) * system.manifold.scale[:, None]  # (n, nv, f)
+    T = system.manifold.at(q).independent.tangent(rank) * system.manifold.scale[:, None]  # (n, nv, f)
     regular = np.linalg.svd(T[:, index] / system.manifold.scale[index, None], compute_uv=False)[:, -1] > _DETERMINED
     N[regular] = np.matmul(T[regular], np.linalg.pinv(T[regular][:, index]))
     return N

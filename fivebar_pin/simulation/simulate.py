@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite, integer, number
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import System, Wrench, check_frame
+from fivebar_pin.dynamics.equations import EquationsOfMotion
 from fivebar_pin.dynamics.forward import constant_torque, require_consistent
+from fivebar_pin.dynamics.wrenches import Wrench, require_frames
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.simulation.chart_motion import ClosedState, Inputs
 from fivebar_pin.simulation.integrator import run
@@ -85,16 +86,14 @@ def simulate(
     integer("max_steps", max_steps, least=1)
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
-    integer("max_steps", max_steps, least=1)
-    system = System.of(chain)
-    for frame in external or {}:
-        check_frame(chain, frame)
+    system = EquationsOfMotion.of(chain)
+    require_frames(chain, external or {})
     state = _initial_state(system, checked("q", q, (chain.nq,)), checked("v", v, (chain.nv,)), initial)
     inputs = Inputs(tau if callable(tau) else constant_torque(chain, tau), dict(external or {}))
     return run(system, inputs, state, times, rtol=rtol, atol=atol, max_steps=max_steps, progress=progress)
 
 
-def _initial_state(system: System, q: Array, v: Array, initial: str) -> ClosedState:
+def _initial_state(system: EquationsOfMotion, q: Array, v: Array, initial: str) -> ClosedState:
     """Return the state brought to round-off, once it is consistent or asked to be made so."""
     manifold = system.manifold
     if initial == "check":

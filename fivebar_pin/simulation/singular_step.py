@@ -70,7 +70,7 @@ def singular_ahead(motion: ChartMotion, within: float) -> float | None:
     """Return the time after which the closures come nearest to losing rank, as predicted; None if not within."""
     node, manifold = motion.node, motion.system.manifold
     dt = np.linspace(0.0, within, _LOOK)
-    sigma = manifold.at(np.stack([motion.predict(node.t + s) for s in dt])).s[:, motion.rank - 1]
+    sigma = manifold.at(np.stack([motion.predict(node.t + s) for s in dt])).independent.smallest(motion.rank)
     k = int(np.argmin(sigma))
     if k in (0, _LOOK - 1):
         return None

@@ -50,6 +50,7 @@ COLOURS: dict[str, Colour] = {
     "force": (0.05, 0.05, 0.05, 1.0),
 }
 
+_WRITTEN = 1e-6  # difference of colours by the digits that files keep [-]
 _THICKNESS = 0.045
 """Radius of a link, as a part of the chain's characteristic length [-]."""
 
@@ -97,7 +98,7 @@ def is_counterweight(visual: Visual) -> bool:
     """Return whether a shape is a counterweight that `balancing.realise` has made: by its colour, also from a file."""
     from fivebar_pin.balancing.counterweights import COLOUR
 
-    return bool(np.allclose(visual.rgba, COLOUR, rtol=0.0, atol=1e-6))
+    return bool(np.allclose(visual.rgba, COLOUR, rtol=0.0, atol=_WRITTEN))
 
 
 def safe(name: str) -> str:
@@ -150,5 +151,5 @@ def amid_ground(chain: ClosedChain) -> Array:
 
 def ground_closures(chain: ClosedChain) -> list[Array]:
     """Return the places of the closure frames that are fixed to the ground."""
-    frames = [find_frame(chain.model, f) for c in chain.closures for f in c.frames]
+    frames = [find_frame(chain.model, f) for c in chain.closures for f in c.ends]
     return [np.array(f.placement.translation) for f in frames if f.parentJoint == 0]

@@ -13,7 +13,7 @@ import fivebar_pin as fb
 from fivebar_pin import motion as laws
 from fivebar_pin._arrays import settled
 from fivebar_pin.balancing import Ball, Box, Design, balance, balance_problem, compare, score
-from fivebar_pin.balancing._quantities import MEASURES
+from fivebar_pin.balancing.regressors.measures import MEASURES
 from fivebar_pin.cli._moving import standing, sway
 from fivebar_pin.dynamics import Loads, inverse_dynamics
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import mechanisms
@@ -12,8 +13,9 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin import JointSpring, Spring
 from fivebar_pin import motion as laws
-from fivebar_pin.balancing import Box, balance, balance_conditions
-from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.balancing import Box, Disc, balance, balance_conditions, realise
+from fivebar_pin.balancing.branches import _alike, branches
+from fivebar_pin.errors import InvalidInputError, SolverError
 
 G = 9.81
 DOWN = (0.0, -G, 0.0)
@@ -196,3 +198,93 @@ def test_conditions_of_other_springs_are_not_taken():
     bare = balance_conditions(lever(), "static", gravity="model")
     heavier = balance(lever(), "static", gravity=(0.0, -5.0, 0.0), conditions=bare, material=None)
     assert heavier.feasible  # without springs the direction alone plays a part
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_springs_of_no_length_on_a_lever_ask_for_one_first_moment(seed):
+    """In complex numbers, springs k from h in the ground to c on the lever: m z = sum i k conj(h) c / g."""
+    rng = np.random.default_rng(seed)
+    model = lever().model.copy()
+    wanted, springs = 0.0, []
+    for n in range(3):
+        k, (h, c) = rng.uniform(10.0, 500.0), rng.normal(size=(2, 2))
+        mechanisms.point(model, 0, f"h{n}", mechanisms.at(*h))
+        mechanisms.point(model, 1, f"c{n}", mechanisms.at(*c, rng.normal()))  # what is out of the plane does no work
+        springs.append(Spring(*rng.permutation([f"h{n}", f"c{n}"]), k, 0.0, rng.uniform()))
+        wanted += 1j * k * np.conj(complex(*h)) * complex(*c) / G
+    chain = fb.ClosedChain(model, (), ("lever",), springs=springs)
+    found = balance_conditions(chain, "static", gravity="model")
+    assert found.unheld == 0.0
+    pi = np.array(chain.inertial_parameters)
+    assert np.abs(found.residual(pi)).max() > 0.1
+    pi[0, 1:3] = wanted.real, wanted.imag
+    np.testing.assert_allclose(found.residual(pi), 0.0, atol=1e-12 * abs(wanted))
+    constants = {name: -c for name, c in zip(("mcx", "mcy"), (wanted.real, wanted.imag), strict=True)}
+    for equation in found.equations:
+        name, _, number = equation.removesuffix(" = 0").partition("(lever) ")
+        assert float(number.replace(" ", "")) == pytest.approx(constants[name], rel=1e-9)
+
+
+def test_springs_where_weight_does_no_work_are_held_by_none():
+    """A hinge along gravity: the conditions hold nothing but the springs, and say so."""
+    chain = lever(Spring("high", "arm", 400.0, 0.0)).with_gravity((0.0, 0.0, -G))
+    found = balance_conditions(chain, "static", gravity="model")
+    assert found.rank == 0 and found.unheld > 0.1
+    assert len(found.equations) == 1
+    with pytest.raises(InvalidInputError, match="cannot influence the static conditions"):
+        balance(chain, "static", gravity="model")
+
+
+def test_realised_counterweights_keep_the_springs_and_hold_them():
+    chain = lever(Spring("high", "arm", 400.0, 0.0))
+    design = balance(chain, "static", gravity="model", counterweight=Disc("steel", 0.05))
+    assert design.feasible
+    made = realise(design)
+    assert made.chain.springs == chain.springs
+    assert made.residual < 1e-9
+    assert np.abs(resting(made.chain, np.linspace(-3.0, 3.0, 50)[:, None])).max() < 1e-8
+
+
+def test_torque_that_is_round_off_of_weight_and_springs_is_told_as_none():
+    chain = lever(Spring("high", "arm", 400.0, 0.0), mass=400.0 * 0.3 * 0.2 / (G * 0.5))
+    q = np.linspace(-3.0, 3.0, 50)[:, None]
+    loads = fb.inverse_dynamics(chain, fb.drive(chain, fb.Motion(np.linspace(0.0, 1.0, 50), q, 0.0 * q, 0.0 * q)))
+    assert np.abs(loads.torque).max() > 0.0
+    assert loads.peak("torque") == 0.0
+
+
+def test_a_damper_whose_ends_never_part_plays_no_part_at_rest():
+    """Its force has no direction, which inverse dynamics refuses; at rest there is none."""
+    chain = lever(Spring("universe", "lever_body", 100.0, 0.0, 2.0))
+    np.testing.assert_array_equal(balance_conditions(chain, "static").offset, 0.0)
+    with pytest.raises(SolverError, match="ends on one point"):
+        resting(chain, np.zeros((1, 1)))
+
+
+def test_conditions_with_springs_are_not_those_without():
+    chain = lever(Spring("high", "arm", 400.0, 0.0))
+    found = balance_conditions(chain, "static", gravity="model")
+    for given, conditions in (
+        (chain.with_springs(()), found),
+        (chain, balance_conditions(lever(), "static", gravity="model")),
+        (chain.with_springs([JointSpring("lever", 1.0, 0.0)]), found),
+    ):
+        with pytest.raises(InvalidInputError, match="must hold the springs of lever"):
+            balance(given, "static", gravity="model", conditions=conditions)
+
+
+def test_a_branch_that_holds_its_springs_asks_less_than_all_of_them_that_do_not():
+    chain = lever(Spring("high", "arm", 400.0, 0.0))
+    found = balance_conditions(chain, "static", gravity="model")
+    assert branches(chain, found, gravity="model") == ()
+    (one,) = branches(chain, replace(found, unheld=1.0), gravity="model")
+    assert one.conditions.equations == found.equations
+
+
+def test_branches_with_other_constants_are_two():
+    soft, hard, again = (
+        balance_conditions(lever(Spring("high", "arm", k, 0.0)), "static", gravity="model")
+        for k in (300.0, 400.0, 400.0)
+    )
+    assert _alike(hard, again)
+    assert not _alike(soft, hard)

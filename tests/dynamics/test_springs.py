@@ -254,3 +254,18 @@ def test_an_infinite_or_negative_spring_is_refused(bad):
     for value in (np.nan, np.inf, -1.0):
         with pytest.raises(InvalidInputError, match=bad if bad != "length" or value == -1.0 else "rest"):
             Spring("a", "b", **{"stiffness": 1.0, "length": 1.0, "damping": 0.0, bad: value})
+
+
+def test_the_power_of_a_damper_is_its_coefficient_times_the_square_of_its_rate():
+    """A slide pulls a damper of 3 N s/m in line with it at 2 m/s, a joint damper of 5 N s/m beside it."""
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    slide = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(slide, body(1), pin.SE3.Identity())
+    point(model, slide, "end", pin.SE3.Identity())
+    for damper, lost in ((Spring("universe", "end", 0.0, 0.1, 3.0), 12.0), (JointSpring("slide", 0.0, 0.0, 5.0), 20.0)):
+        chain = fb.ClosedChain(model, (), ("slide",), springs=[damper])
+        moved = fb.drive(chain, Motion([0.0], [[0.5]], [[2.0]], [[0.0]]))
+        account = fb.energy_balance(chain, moved)
+        np.testing.assert_allclose(account.dissipated, [lost], rtol=1e-14)
+        np.testing.assert_allclose(account.stored_rate, [0.0], rtol=0.0, atol=1e-13)

@@ -605,3 +605,47 @@ def test_progress_is_told_from_start_to_end():
     simulate(chain, q, v, None, [0.0, 0.5], progress=told.append)
     assert told == sorted(told)
     assert told[-1] == 1.0
+
+
+def test_drift_is_counted_from_the_start_and_relative_to_the_energy_that_changes():
+    """A hinge 5 m up turns at 0, 2 and 1 rad/s: of the largest kinetic energy, all has come; the height is no part."""
+    chain = pendulum()
+    model = chain.model.copy()
+    model.gravity.linear = np.array([0.0, 0.0, -9.81])
+    model.jointPlacements[1] = mechanisms.at(z=5.0)
+    high = fb.ClosedChain(model, (), ("hinge",))
+    moved = fb.drive(high, fb.Motion([0.0, 1.0, 2.0], [[0.0], [1.0], [2.0]], [[0.0], [2.0], [1.0]], np.zeros((3, 1))))
+    balance = energy_balance(high, moved)
+    np.testing.assert_allclose(balance.potential, 5.0 * 9.81, rtol=1e-14)
+    assert balance.drift() == pytest.approx(1.0, rel=1e-12)
+
+
+def test_two_hinges_on_one_axis_need_mass_between_them():
+    """The massless link may turn against the rod without moving any mass: rounding must not hide it."""
+    model = pin.Model()
+    rod = pin.Inertia(1.0, np.array([0.37, 0.11, 0.0]), np.diag([0.1, 0.2, 0.3]))
+    first = mechanisms.add(model, 0, pin.JointModelRZ(), mechanisms.at(), "first", pin.Inertia.Zero())
+    mechanisms.add(model, first, pin.JointModelRZ(), mechanisms.at(), "second", rod)
+    chain = fb.ClosedChain(model, (), ())
+    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (20, 2)):
+        with pytest.raises(InvalidInputError, match="inertia of the free motion"):
+            forward_dynamics(chain, q, np.zeros(2))
+
+
+@pytest.mark.parametrize("off", [1e-5, 1e-6, 1e-7])
+def test_a_state_that_is_all_but_closed_is_not_closed(off):
+    """A hundred millionth is rounding; ten times that is another mechanism, in place and in velocity."""
+    chain = mechanisms.five_bar()
+    q, v = state_of(chain)
+    out = np.array([0.0, 1.0, 0.0, 0.0])  # an elbow alone opens the loop by its link
+    with pytest.raises(InvalidInputError, match="closure tip at state 0"):
+        forward_dynamics(chain, q + off * out, v)
+    with pytest.raises(InvalidInputError, match="rate of the closures at state 0"):
+        forward_dynamics(chain, q, v + off * np.abs(v).max() * out)
+    batch, rates = np.stack([q, q + off * out, q]), np.stack([v, v, v + off * np.abs(v).max() * out])
+    with pytest.raises(InvalidInputError, match="closure tip at state 1"):
+        forward_dynamics(chain, batch, rates)
+    with pytest.raises(InvalidInputError, match="rate of the closures at state 2"):
+        forward_dynamics(chain, batch[[0, 0, 0]], rates)
+    a = forward_dynamics(chain, q + 1e-10 * out, v * (1.0 + 1e-10))
+    np.testing.assert_allclose(a, forward_dynamics(chain, q, v), rtol=1e-6)

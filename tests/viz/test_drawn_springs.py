@@ -89,3 +89,14 @@ def test_the_picture_holds_the_ends_of_springs() -> None:
     far = fb.ClosedChain(model, large.chain.closures, large.chain.actuated, springs=[Spring("far", ENDS[1], 1.0, 0.0)])
     sizes = [scene._drawings([s], 1.0, True)[0].size for s in (small, viz.Shown(far, large.trajectory))]
     assert sizes[1] > sizes[0] + 5.0
+
+
+def test_a_spring_whose_ends_never_part_is_drawn_all_the_same() -> None:
+    model = pin.Model()
+    mechanisms.add(model, 0, pin.JointModelRZ(), mechanisms.at(), "hinge", mechanisms.body(1))
+    chain = fb.ClosedChain(model, (), ("hinge",), springs=[Spring("universe", "hinge_body", 1.0, 0.0)])
+    still = viz.Shown.at(chain, [0.3])
+    notes = Notes()
+    draw_springs(notes, "/m", scene._drawings([still], 1.0, True)[0])  # type: ignore[arg-type]
+    (wire,) = (x for name, x in notes.drawn.items() if name.endswith("wire"))
+    assert np.isfinite(wire).all() and np.ptp(wire[:, 2]) > 0.0
