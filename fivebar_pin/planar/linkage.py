@@ -20,6 +20,7 @@ from fivebar_pin.planar._parts import (
     GROUND,
     THICKNESS,
     WIDTH,
+    Gear,
     Guide,
     Link,
     Lump,
@@ -73,6 +74,7 @@ class Linkage:
         self.links: dict[str, Link] = {GROUND: Link(GROUND, ())}
         self.lumps: list[Lump] = []
         self.springs: list[PointSpring] = []
+        self.gears: list[Gear] = []
         self.motors: list[Motor] = []
 
     def points(self, places: Mapping[str, Sequence[float]] | None = None, /, **named: Sequence[float]) -> None:
@@ -189,6 +191,23 @@ class Linkage:
         ]
         self.springs.append(PointSpring((ends[0], ends[1]), *values))
 
+    def gear(self, driver: str, driven: str, *, ratio: float, carrier: str = GROUND) -> None:
+        """Gear two links to each other: turn of `driven` = ratio * turn of `driver`, both counted on the carrier.
+
+        They mesh as they lie in the sketch, and count their turns. Wheels that touch outside turn against each other:
+        ratio = -teeth of the driver / teeth of the driven. A wheel is a bar with one point and a mass of its own.
+
+        Args:
+            driver, driven: links that turn.
+            ratio: of their angles on the carrier; not zero [-].
+            carrier: link that carries both wheels; the ground unless given.
+        """
+        if number(f"ratio of gear {driver}_{driven}", ratio) == 0.0:
+            raise InvalidInputError(f"ratio of gear {driver}_{driven}", ratio, "must not be zero")
+        if len({driver, driven, carrier}) < 3:
+            raise InvalidInputError("links of a gear", (driver, driven, carrier), "must be three different ones")
+        self.gears.append(Gear(driver, driven, float(ratio), carrier))
+
     def motor(self, link: str, *, at: str = "", on: str = "") -> None:
         """Drive a link: where it turns at a point, or along its line when it is a slide.
 
@@ -215,6 +234,7 @@ class Linkage:
             self.sketch,
             dict(sorted(self.links.items(), key=lambda item: _rank(item[1]))),
             motors=motors,
+            gears=self.gears,
             lumps=self.lumps,
             springs=self.springs,
             gravity=self.gravity,
@@ -271,6 +291,9 @@ class Linkage:
             raise UnknownNameError(f"point of {link}", point, points)
 
     def _check_links(self) -> None:
+        for gear in self.gears:
+            for name in (gear.driver, gear.driven, gear.carrier):
+                self._link(name)
         for link in self.links.values():
             self._known(link.points)
             if link.guide is not None:
