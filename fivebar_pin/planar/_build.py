@@ -233,6 +233,9 @@ class _Builder:
     def spring(self, spring: PointSpring) -> Spring:
         """Return a spring between links that are not the same one."""
         one, other = ([x.name for x in self.links.values() if point in x.points] for point in spring.ends)
+        for point, links in zip(spring.ends, (one, other), strict=True):
+            if not links:
+                raise InvalidInputError(f"point {point} of a spring", spring.ends, "must belong to a bar or the ground")
         pairs = [(a, b) for a in one for b in other if a != b]
         if not pairs:
             raise InvalidInputError(

@@ -99,6 +99,23 @@ def test_a_gear_too_many_makes_a_structure() -> None:
         made.chain()
 
 
+def test_a_gear_between_links_that_turn_alike_ties_nothing() -> None:
+    made = train()
+    made.slide("collar", "P", on="arm")
+    made.gear("arm", "collar", ratio=1.0)
+    with pytest.raises(InvalidInputError, match="ties nothing"):
+        made.chain()
+
+
+def test_a_geared_linkage_is_saved_and_read(tmp_path) -> None:
+    chain = train().chain()
+    fb.save(chain, tmp_path)
+    for name in ("train.urdf", "train.xml"):
+        read = fb.load(tmp_path / name)
+        one, two = (fb.inverse_dynamics(c, swing(c, 2.0)) for c in (chain, read))
+        np.testing.assert_allclose(one.torque, two.torque, rtol=0.0, atol=1e-13)
+
+
 @pytest.mark.parametrize(
     ("say", "kind", "message"),
     [
