@@ -139,7 +139,7 @@ def coinciding_pairs(
 ) -> list[Pair]:
     """Return frames of different bodies that coincide at one of the configurations, but not at every one.
 
-    Frames on bodies that carry nothing further come first: where a loop is cut, something ends.
+    One of the bodies must carry nothing further, for something ends where a loop is cut, or both frames be markers.
     """
     ends = [end for end in ends if end.joint or end.is_marker]
     if len(ends) > _MOST_FRAMES or len(ends) < 2:
