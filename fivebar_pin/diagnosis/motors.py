@@ -49,7 +49,7 @@ def propose_motors(chain: ClosedChain, q: npt.ArrayLike | None = None) -> tuple[
     Sets of joints that determine the motion are the bases of a matroid, so taking the most likely joint that adds
     something, again and again, gives the best set. A name like motor or drive speaks most for a joint, a name like
     free or ball against it, then a finite effort limit where others have none, a body with a mass, and the ground
-    being near. Freedoms that move nothing else, as the spin of a rod between two balls, need no motor.
+    being near. A joint that no closure feels, as a pin that spins at its own place, gets no motor.
 
     Args:
         chain: with its closures; what it drives already is passed over.

@@ -450,6 +450,9 @@ def test_what_is_given_wrongly_is_refused() -> None:
         propose_closures(tree, pairs=[("B_couple", "B_rocker")])
     with pytest.raises(InvalidInputError, match=r"must be on two bodies; these are on one"):
         propose_closures(tree, pairs=[("coupler_link", "B_coupler")])
+    for pair in ("B_coupler", ("B_coupler",), ("B_coupler", "B_rocker", "G_strut")):
+        with pytest.raises(InvalidInputError, match="must be two frame names"):
+            propose_closures(tree, pairs=[pair])  # type: ignore[list-item]
     with pytest.raises(UnknownNameError, match="Unknown closure kind 'ball'"):
         propose_closures(tree, kind="ball")
     with pytest.raises(InvalidInputError, match="shape of q"):
