@@ -122,10 +122,11 @@ def _depth(chain: ClosedChain, j: int) -> int:
 
 def _reason(chain: ClosedChain, j: int) -> str:
     name = str(chain.model.names[j])
-    if _FREE.search(name) and not _DRIVEN.search(name):
-        return "free by its name; without it something stays undetermined, so hold it where it is"
+    named = bool(_DRIVEN.search(name))
+    if (_FREE.search(name) and not named) or (not _has_body(chain, j) and chain.mass > 0.0):
+        return "nothing else determines what is left; hold it where it is"
     words = []
-    if _DRIVEN.search(name):
+    if named:
         words.append("its name")
     if _has_effort(chain, j) and not all(_has_effort(chain, k) for k in range(1, chain.model.njoints)):
         words.append("an effort limit")

@@ -493,3 +493,21 @@ def test_a_freedom_that_moves_nothing_else_gets_no_motor() -> None:
     spun = replace(chain, model=model, closures=(fb.Closure(("spin_body", "tip_right")),), actuated=())
     assert diagnose(spun).generic_mobility == 3
     assert [m.joint for m in propose_motors(spun)] == ["left", "right"]
+
+
+def test_a_motor_says_what_speaks_for_it() -> None:
+    """Where only joints are left that are free by their names, they have to be held rather than driven."""
+    tree = two_arms(at())
+    closed = closing(tree, propose_closures(tree))
+    model = closed.model.copy()
+    for j, name in ((1, "waist_motor"), (2, "ball_x"), (5, "free_base")):
+        model.names[j] = name
+    model.upperEffortLimit = np.r_[5.0, np.full(7, np.inf)]
+    first, *_ = propose_motors(replace(closed, model=model))
+    assert (first.joint, first.reason) == ("waist_motor", "its name, an effort limit, on the ground")
+    spun = replace(mechanisms.five_bar(), actuated=())
+    names = spun.model.copy()
+    for j in range(1, 5):
+        names.names[j] = f"free_{j}"
+    reasons = {m.reason for m in propose_motors(replace(spun, model=names))}
+    assert reasons == {"nothing else determines what is left; hold it where it is"}
