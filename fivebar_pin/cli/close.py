@@ -41,7 +41,9 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     parser.add_argument("path", help="URDF file, or a folder with one; what a sidecar beside it says besides is kept")
     parser.add_argument("--out", metavar="PATH", help="sidecar to write; the URDF's name ending in .yaml unless given")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing sidecar")
-    parser.add_argument("--kind", metavar="K", help="kind of all closures: 3d, 6d or revolute; the fitting one")
+    parser.add_argument(
+        "--kind", metavar="K", help="kind of all closures (3d, 6d, revolute); the one that suits each loop unless given"
+    )
     parser.add_argument(
         "--pair", nargs=2, action="append", default=[], metavar="FRAME", help="join these frames, and nothing else"
     )

@@ -35,7 +35,7 @@ _ALWAYS = 1e-7
 """Distance below which two origins are one whatever the joints do; round-off only [chain lengths]."""
 _PROBES = 3
 """Random configurations at which origins that always coincide show it [-]."""
-_MOST_FRAMES = 600
+_MOST_FRAMES = 5000
 """Frames above which coincidences are not looked for: every pair of them is measured [-]."""
 _MOST_ENDS = 6
 """Pairs of open ends up to which they are worth telling [-]."""
@@ -139,7 +139,8 @@ def coinciding_pairs(
 ) -> list[Pair]:
     """Return frames of different bodies that coincide at one of the configurations, but not at every one.
 
-    Frames on bodies that carry nothing further come first: where a loop is cut, something ends.
+    One of the bodies must carry nothing further, for something ends where a loop is cut, or both frames be markers.
+    Trees of more than 5000 frames are not looked at.
     """
     ends = [end for end in ends if end.joint or end.is_marker]
     if len(ends) > _MOST_FRAMES or len(ends) < 2:

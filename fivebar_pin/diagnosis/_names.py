@@ -14,7 +14,6 @@ _LOOP = re.compile(r"clos(?:ed?|ing|ure)[ _-]*loop|closing|closure|loop", re.IGN
 _LETTER = re.compile(r"(?<![A-Za-z])([AaBb])(?![A-Za-z])")
 _DIGIT = re.compile(r"(?<!\d)([12])(?!\d)")
 _WORD = re.compile(r"(first|second|parent|child|start|end)(?![A-Za-z])", re.IGNORECASE)
-_MATES = ({"a", "b"}, {"1", "2"}, {"first", "second"}, {"parent", "child"}, {"start", "end"})
 _POINT = re.compile(r"([A-KM-QS-Z]\d*|(?:pin|pivot|point|hinge)_?\d+)[_-].+")  # L and R are sides
 
 
@@ -31,7 +30,7 @@ def named_pairs(ends: Iterable[End]) -> Iterator[Pair]:
                     found[-1].group(1).lower(), end
                 )
         for both in sides.values():
-            if set(both) in _MATES:
+            if len(both) == 2:
                 one, other = (both[side] for side in sorted(both, key=_side))
                 left = [end for end in left if end not in (one, other)]
                 if one.joint != other.joint:

@@ -47,7 +47,7 @@ class Posed:
     @property
     def only_over(self) -> bool:
         """Whether nothing is wrong but that some closures hold only with these exact dimensions."""
-        return self.mobility > 0 and all(text == _OVER for text in self.problems.values())
+        return all(text == _OVER for text in self.problems.values())
 
 
 def pose(chain: ClosedChain, closures: Iterable[Closure], starts: list[Array]) -> Posed:

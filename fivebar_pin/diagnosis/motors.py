@@ -49,7 +49,7 @@ def propose_motors(chain: ClosedChain, q: npt.ArrayLike | None = None) -> tuple[
     Sets of joints that determine the motion are the bases of a matroid, so taking the most likely joint that adds
     something, again and again, gives the best set. A name like motor or drive speaks most for a joint, a name like
     free or ball against it, then a finite effort limit where others have none, a body with a mass, and the ground
-    being near. Freedoms that move nothing else, as the spin of a rod between two balls, need no motor.
+    being near. A joint that no closure feels, as a pin that spins at its own place, gets no motor.
 
     Args:
         chain: with its closures; what it drives already is passed over.
@@ -122,10 +122,11 @@ def _depth(chain: ClosedChain, j: int) -> int:
 
 def _reason(chain: ClosedChain, j: int) -> str:
     name = str(chain.model.names[j])
-    if _FREE.search(name) and not _DRIVEN.search(name):
-        return "free by its name; without it something stays undetermined, so hold it where it is"
+    named = bool(_DRIVEN.search(name))
+    if (_FREE.search(name) and not named) or (not _has_body(chain, j) and chain.mass > 0.0):
+        return "nothing else determines what is left; hold it where it is"
     words = []
-    if _DRIVEN.search(name):
+    if named:
         words.append("its name")
     if _has_effort(chain, j) and not all(_has_effort(chain, k) for k in range(1, chain.model.njoints)):
         words.append("an effort limit")

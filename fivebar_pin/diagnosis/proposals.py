@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, Immutable, checked
+from fivebar_pin._arrays import Array, Immutable, all_of, checked
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.diagnosis._candidate import Candidate
@@ -47,7 +48,7 @@ class Proposal(Immutable):
         evidence: what speaks for it.
         gap: distance of the two origins where they are closest among the configurations looked at [m].
         angle: angle between the closure's axis (z unless it is a hinge about another) in the two frames there [rad].
-        sure: "sure", "likely" or "possible".
+        sure: how sure it is.
         chosen: whether it belongs to the set that is proposed.
         reason: why it is chosen, or why not.
     """
@@ -56,7 +57,7 @@ class Proposal(Immutable):
     evidence: Evidence
     gap: float
     angle: float
-    sure: str
+    sure: Literal["sure", "likely", "possible"]
     chosen: bool
     reason: str
 
@@ -113,12 +114,15 @@ def _starts(chain: ClosedChain, q: npt.ArrayLike | None) -> list[Array]:
 
 
 def _given(ends: dict[str, End], pair: tuple[str, str]) -> Pair:
-    for name in pair:
+    names = all_of("pair of frames", pair, str)
+    if isinstance(pair, str) or len(names) != 2:
+        raise InvalidInputError("pair of frames", pair, "must be two frame names")
+    for name in names:
         if name not in ends:
             raise UnknownNameError("frame", name, ends)
-    one, other = (ends[name] for name in pair)
+    one, other = (ends[name] for name in names)
     if one.joint == other.joint:
-        raise InvalidInputError("pair of frames", list(pair), "must be on two bodies; these are on one")
+        raise InvalidInputError("pair of frames", list(names), "must be on two bodies; these are on one")
     return Pair((one, other), Evidence.GIVEN)
 
 
@@ -135,9 +139,11 @@ def _names(pair: Pair) -> frozenset[str]:
 
 
 def _proposal(c: Candidate) -> Proposal:
+    return Proposal(c.closure, c.pair.evidence, c.gap, c.angle, _sure(c), c.chosen, c.reason)
+
+
+def _sure(c: Candidate) -> Literal["sure", "likely", "possible"]:
     evidence = c.pair.evidence
     if evidence in (Evidence.GIVEN, Evidence.NAMED) or (evidence is Evidence.POINT and c.meets):
-        sure = "sure"
-    else:
-        sure = "likely" if evidence in (Evidence.POINT, Evidence.COINCIDE) else "possible"
-    return Proposal(c.closure, evidence, c.gap, c.angle, sure, c.chosen, c.reason)
+        return "sure"
+    return "likely" if evidence in (Evidence.POINT, Evidence.COINCIDE) else "possible"

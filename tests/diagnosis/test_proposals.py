@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -142,6 +143,67 @@ def test_the_kind_that_names_state_is_taken(word: str, mobility: int) -> None:
     assert diagnose(closing(tree, (proposal,))).generic_mobility == mobility
 
 
+def test_two_names_for_one_loop_close_it_once() -> None:
+    model = mechanisms.five_bar().model.copy()
+    for side, joint, x in (("A", "left_elbow", 1.2), ("B", "right_elbow", 1.0)):
+        for k in (1, 2):
+            point(model, model.getJointId(joint), f"closedloop{k}_{side}", at(x))
+    one, other = propose_closures(fb.ClosedChain(model, (), ()))
+    assert (one.chosen, other.chosen) == (True, False)
+    assert other.reason == "it follows from the other closures: it takes no freedom away"
+
+
+def test_names_on_one_body_and_points_named_otherwise_say_nothing() -> None:
+    tree = opened(mechanisms.five_bar())
+    model = tree.model.copy()
+    elbow = model.getJointId("left_elbow")
+    for name, joint in (
+        ("closedloop_A", elbow), ("closedloop_B", elbow), ("D_one", elbow), ("D_two", elbow),
+        ("E_one", 1), ("E_two", 2), ("E_three", 3), ("L_one", 1), ("L_two", 2),
+    ):  # fmt: skip
+        point(model, joint, name, at(0.1 * joint))
+    model = renamed(replace(tree, model=model), {"left_body": "F_one", "right_body": "F_two"}).model
+    proposals = propose_closures(replace(tree, model=model))
+    assert {p.evidence for p in proposals} <= {Evidence.ENDS, Evidence.COINCIDE}
+
+
+def test_the_frame_of_a_fixed_joint_is_no_second_end(tmp_path: Path) -> None:
+    """URDF gives a marker's link and the fixed joint that carries it nearly one name."""
+    text = fb.io.shipped_path("slider_crank").read_text()
+    for old, new in (("B_rod", "closedloop_A"), ("B_slider", "closedloop_B")):
+        text = text.replace(f'"{old}"', f'"{new}"').replace(f'"{old}_joint"', f'"{new}_joint"')
+    (tmp_path / "one.urdf").write_text(text)
+    (proposal,) = propose_closures(fb.load(tmp_path / "one.urdf", closures=(), actuated=()))
+    assert set(proposal.closure.frames) == {"closedloop_A", "closedloop_B"}
+
+
+def test_a_ball_of_three_hinges_is_joined_at_its_last_body() -> None:
+    """The usual way to write a ball joint in a URDF: two crosses, and a stub that the rest is fixed to."""
+    tree = two_arms(at(), joints=3)
+    model = tree.model.copy()
+    j, place = model.getJointId("other2"), model.frames[model.getFrameId("hand_other")].placement
+    for kind, name in ((X(), "cross1"), (pin.JointModelRY(), "cross2"), (Z(), "stub")):
+        j, place = add(model, j, kind, pin.SE3(place), name, body(8)), at()
+    model.frames[model.getFrameId("hand_other")].name = "socket"
+    tree = fb.ClosedChain(model, (), ())
+    proposals = propose_closures(tree)
+    assert chosen(proposals) == {frozenset(("hand_one", "stub_body")): "6d"}
+    assert diagnose(closing(tree, proposals)).generic_mobility == 3
+
+
+def test_only_the_loop_that_is_overconstrained_is_called_so() -> None:
+    """Bennett's loop and a five-bar on one frame, both named: the five-bar is as good as alone."""
+    chain, q = mechanisms.bennett()
+    model = renamed(chain, {"hinge_ground": "closedloop1_A", "hinge_moving": "closedloop1_B"}).model
+    for k, x in enumerate((3.0, 4.0)):
+        j = add(model, 0, Z(), at(x), f"bar{k}", body(k))
+        j = add(model, j, Z(), at(0.7), f"rod{k}", body(k))
+        point(model, j, f"closedloop2_{'AB'[k]}", at(0.9))
+    proposals = propose_closures(fb.ClosedChain(model, (), ()), np.r_[q, np.zeros(4)], kind="revolute")
+    assert [p.chosen for p in proposals] == [True, True]
+    assert ["overconstrained" in p.reason for p in proposals] == [True, False]
+
+
 def two_bars(*, more: bool = False) -> fb.ClosedChain:
     """Two bars from the ground whose tips touch in neutral; with `more`, an arm that moves freely besides."""
     model = pin.Model()
@@ -180,11 +242,58 @@ def test_an_accident_beside_a_real_loop_is_told_apart() -> None:
     assert left.reason.startswith("it would lock crank")
 
 
+def branches(*joints: tuple[int, object, pin.SE3], marks: dict[str, tuple[int, pin.SE3]]) -> fb.ClosedChain:
+    """Return a tree of joints (parent, kind, placement) with markers (joint, placement)."""
+    model = pin.Model()
+    model.addBodyFrame("base", 0, at(), 0)
+    for k, (parent, kind, placement) in enumerate(joints):
+        add(model, parent, kind, placement, f"j{k + 1}", body(k))
+    for name, (joint, placement) in marks.items():
+        point(model, joint, name, placement)
+    return fb.ClosedChain(model, (), ())
+
+
+Z, X, SLIDE = pin.JointModelRZ, pin.JointModelRX, pin.JointModelPX
+
+
 def test_what_always_coincides_is_no_loop() -> None:
-    """Two arms on one shaft, and a wrist of three crossing axes: their frames meet whatever the joints do."""
-    chain = mechanisms.five_bar((0.5, 1.2, 1.0, 0.6, 0.0))
-    proposals = propose_closures(opened(chain), np.array([0.3, 0.4, 0.5, 0.6]))
-    assert {frozenset(p.closure.frames) for p in proposals} == {frozenset(("tip_left", "tip_right"))}
+    """Two arms on one shaft, marked there: their frames meet whatever the joints do, and a closure holds nothing."""
+    tree = branches((0, Z(), at()), (0, Z(), at()), marks={"u": (1, at(z=0.2)), "v": (2, at(z=0.2))})
+    assert all(p.evidence is not Evidence.COINCIDE for p in propose_closures(tree))
+    (proposal,) = propose_closures(tree, pairs=[("u", "v")])
+    assert proposal.reason.endswith("no joint moves the two frames apart: it would hold nothing")
+
+
+def test_joints_that_start_at_one_place_are_no_loop() -> None:
+    """A telescope on a turret, the two jaws of a gripper, an arm folded back to its base where the file stands."""
+    turret = branches((0, Z(), at()), (1, SLIDE(), at()), marks={})
+    jaws = branches((0, SLIDE(), at()), (0, pin.JointModelPY(), at()), marks={})
+    folded = branches((0, X(), at(x=1.0)), (1, Z(), at(y=1.0)), (2, X(), at(x=-1.0)), marks={"u": (3, at(y=-1.0))})
+    for tree in (turret, jaws, folded):
+        assert propose_closures(tree) == ()
+
+
+def test_no_end_is_joined_twice() -> None:
+    """Three spatial arms meet in one place where the file stands: two of them are joined, which two is a guess."""
+    tree = two_arms(at(rpy=(0.4, 0.0, 0.7)))
+    model = tree.model.copy()
+    j = 0
+    for k in range(4):
+        j = add(
+            model,
+            j,
+            Z(),
+            pin.SE3(pin.exp3(np.array([0.3, k, 1.0])), np.array([0.4, 0.2, 0.1 * k])),
+            f"third{k}",
+            body(k),
+        )
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    here = data.oMf[model.getFrameId("hand_one")]
+    point(model, j, "hand_third", data.oMi[j].actInv(here * at(rpy=(0.7, 0.5, 0.0))))
+    proposals = propose_closures(replace(tree, model=model))
+    assert sum(p.chosen for p in proposals) == 1
+    assert [p.reason for p in proposals if not p.chosen] == ["one of its ends is joined already"] * 2
 
 
 def two_arms(turn: pin.SE3, *, joints: int = 4, marks: bool = True) -> fb.ClosedChain:
@@ -215,6 +324,31 @@ def test_a_spatial_loop_gets_what_its_frames_share(turn: pin.SE3, kind: str, row
     proposals = propose_closures(tree)
     assert chosen(proposals) == {frozenset(("hand_one", "hand_other")): kind}
     assert diagnose(closing(tree, proposals)).generic_mobility == tree.nv - rows
+
+
+def test_frames_that_are_apart_share_no_axis() -> None:
+    """Parallel where the file stands, but a metre apart: the halves of a rod where a loop is named, else a point."""
+    tree = two_arms(at(x=1.0))
+    for names, kind in ((("closing_1", "closing_2"), "6d"), (("P_one", "P_other"), "3d")):
+        (proposal,) = propose_closures(renamed(tree, dict(zip(("hand_one", "hand_other"), names, strict=True))))
+        assert (proposal.chosen, proposal.closure.kind.value) == (True, kind)
+
+
+def test_a_hand_on_the_ground_shares_a_hinge_with_it() -> None:
+    """The ground is no half of a body."""
+    tree = two_arms(at(), joints=7)
+    model = pin.buildReducedModel(tree.model, list(range(8, 15)), pin.neutral(tree.model))
+    (proposal,) = propose_closures(fb.ClosedChain(model, (), ()))
+    assert proposal.closure.kind.value == "revolute"
+    assert diagnose(closing(fb.ClosedChain(model, (), ()), (proposal,))).generic_mobility == 2
+
+
+@pytest.mark.parametrize(("slide", "kind"), [(pin.JointModelPZ(), "revolute"), (pin.JointModelPX(), "3d")])
+def test_a_slide_across_the_plane_makes_a_loop_spatial(slide: object, kind: str) -> None:
+    bend = at(0.5, rpy=(0.0, 0.0, 0.5 * np.pi))
+    marks = {"u": (3, at(0.3)), "v": (4, at(-0.5, 0.5))}
+    tree = branches((0, Z(), at()), (1, Z(), bend), (2, Z(), bend), (0, slide, at(0.7)), marks=marks)
+    assert chosen(propose_closures(tree)) == {frozenset("uv"): kind}
 
 
 def test_a_weaker_kind_is_taken_where_the_stronger_one_would_lock() -> None:
@@ -282,6 +416,11 @@ def test_of_several_open_ends_none_are_joined() -> None:
     assert all(p.reason == "one of 6 pairs of open ends; nothing says which belong together" for p in proposals)
 
 
+def test_too_many_open_ends_are_not_even_told() -> None:
+    joints = [(0, Z(), at(float(k))) for k in range(5)]
+    assert propose_closures(branches(*joints, marks={f"tip{k}": (k + 1, at(0.3)) for k in range(5)})) == ()
+
+
 def test_ends_that_nearly_meet_are_told_of() -> None:
     """Bars side by side: their ends are 4 mm apart across the plane, which no joint closes."""
     q = fb.assembly_modes(mechanisms.four_bar(), [0.8])[0]
@@ -311,6 +450,9 @@ def test_what_is_given_wrongly_is_refused() -> None:
         propose_closures(tree, pairs=[("B_couple", "B_rocker")])
     with pytest.raises(InvalidInputError, match=r"must be on two bodies; these are on one"):
         propose_closures(tree, pairs=[("coupler_link", "B_coupler")])
+    for pair in ("B_coupler", ("B_coupler",), ("B_coupler", "B_rocker", "G_strut")):
+        with pytest.raises(InvalidInputError, match="must be two frame names"):
+            propose_closures(tree, pairs=[pair])  # type: ignore[list-item]
     with pytest.raises(UnknownNameError, match="Unknown closure kind 'ball'"):
         propose_closures(tree, kind="ball")
     with pytest.raises(InvalidInputError, match="shape of q"):
@@ -351,3 +493,21 @@ def test_a_freedom_that_moves_nothing_else_gets_no_motor() -> None:
     spun = replace(chain, model=model, closures=(fb.Closure(("spin_body", "tip_right")),), actuated=())
     assert diagnose(spun).generic_mobility == 3
     assert [m.joint for m in propose_motors(spun)] == ["left", "right"]
+
+
+def test_a_motor_says_what_speaks_for_it() -> None:
+    """Where only joints are left that are free by their names, they have to be held rather than driven."""
+    tree = two_arms(at())
+    closed = closing(tree, propose_closures(tree))
+    model = closed.model.copy()
+    for j, name in ((1, "waist_motor"), (2, "ball_x"), (5, "free_base")):
+        model.names[j] = name
+    model.upperEffortLimit = np.r_[5.0, np.full(7, np.inf)]
+    first, *_ = propose_motors(replace(closed, model=model))
+    assert (first.joint, first.reason) == ("waist_motor", "its name, an effort limit, on the ground")
+    spun = replace(mechanisms.five_bar(), actuated=())
+    names = spun.model.copy()
+    for j in range(1, 5):
+        names.names[j] = f"free_{j}"
+    reasons = {m.reason for m in propose_motors(replace(spun, model=names))}
+    assert reasons == {"nothing else determines what is left; hold it where it is"}
