@@ -464,3 +464,29 @@ def test_next_to_a_singular_configuration_the_rank_is_whole(away):
     assert (beside.rank, beside.mobility, beside.is_singular) == (2, 1, False)
     assert 0.1 * away < beside.singular_values[1] < 10.0 * away
     assert (flat.rank, flat.mobility, flat.is_singular) == (1, 2, True)
+
+
+def resized(chain: fb.ClosedChain, size: float) -> fb.ClosedChain:
+    """Return the chain with all its lengths times a size."""
+    model = chain.model.copy()
+    for j in range(1, model.njoints):
+        M, inertia = model.jointPlacements[j], model.inertias[j]
+        model.jointPlacements[j] = pin.SE3(M.rotation, size * M.translation)
+        model.inertias[j] = pin.Inertia(inertia.mass, size * inertia.lever, size**2 * inertia.inertia)
+    for frame in model.frames:
+        frame.placement = pin.SE3(frame.placement.rotation, size * frame.placement.translation)
+    return fb.ClosedChain(model, chain.closures, chain.actuated)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_distances_to_singularities_do_not_depend_on_the_size_of_slides(size):
+    """A slide counts in lengths of the mechanism as an angle counts in radians."""
+    for chain, q in ((slider_crank(), fb.assemble(slider_crank(), [0.8])), rscr()):
+        slides = np.array([j.nv == 1 and j.shortname().startswith("JointModelP") for j in list(chain.model.joints)[1:]])
+        place = [j.idx_q for j, slide in zip(list(chain.model.joints)[1:], slides, strict=True) if slide]
+        large = np.array(q)
+        large[place] *= size
+        one, other = diagnose(chain, q), diagnose(resized(chain, size), large)
+        np.testing.assert_allclose(other.singular_values, one.singular_values, rtol=1e-9, atol=1e-12)
+        assert other.sigma == pytest.approx(one.sigma, rel=1e-9)
+        assert other.amplification == pytest.approx(one.amplification, rel=1e-9)
