@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 
+import families
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -490,3 +491,56 @@ def test_distances_to_singularities_do_not_depend_on_the_size_of_slides(size):
         np.testing.assert_allclose(other.singular_values, one.singular_values, rtol=1e-9, atol=1e-12)
         assert other.sigma == pytest.approx(one.sigma, rel=1e-9)
         assert other.amplification == pytest.approx(one.amplification, rel=1e-9)
+
+
+@pytest.mark.parametrize("off", [1e-3, 1e-6, 1e-8])
+def test_a_configuration_that_is_all_but_closed_is_called_open(off):
+    chain = five_bar()
+    q, elbow = fb.assemble(chain, [2.0, 1.0]), np.array([0.0, 1.0, 0.0, 0.0])
+    assert "loops are open at the given configuration" in texts(diagnose(chain, q + off * elbow), "error")
+    assert diagnose(chain, q + 1e-11 * elbow).ok
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_limit_on_either_side_is_told_with_its_joint(side):
+    """The joint is the one whose coordinate it is, behind joints of several coordinates too."""
+    chain, q = rscr()
+    model = chain.model.copy()
+    limit = getattr(model, f"{side}PositionLimit")
+    limit[model.joints[model.getJointId("turn")].idx_q] = 0.7 + (0.1 if side == "lower" else -0.1)
+    limited = fb.ClosedChain(model, chain.closures, chain.actuated)
+    assert "outside the limits of turn" in texts(diagnose(limited, q), "warning")
+    assert "outside the limits" not in texts(diagnose(chain, q), "warning")
+
+
+def test_cosine_and_sine_of_any_size_are_the_same_angle():
+    chain = four_bar(joint=pin.JointModelRUBZ)
+    q = fb.assemble(chain, [0.8])
+    one, other = diagnose(chain, q), diagnose(chain, 3.0 * q)
+    assert other.ok
+    np.testing.assert_allclose(other.q, one.q, rtol=0.0, atol=1e-12)
+
+
+def test_a_motion_of_negative_energy_is_told_from_one_of_none():
+    less = np.tile([0.01, 0.0, 0.0, 0.0, -1.0, 0.0, -1.0, 0.0, 0.0, -1.0], (4, 1))
+    assert "can move with negative kinetic energy" in texts(
+        diagnose(five_bar().with_inertial_parameters(less)), "error"
+    )
+
+
+def test_a_slide_out_of_the_plane_is_no_planar_motion():
+    """Then a flat body is missed: it must be one in space."""
+    model = pin.Model()
+    arm = add(model, 0, pin.JointModelRZ(), at(), "arm", body(1))
+    add(model, arm, pin.JointModelPZ(), at(0.5), "lift", pin.Inertia(1.0, np.zeros(3), np.diag([0.0, 0.0, 0.3])))
+    d = diagnose(fb.ClosedChain(model, (), ("arm", "lift")))
+    assert "no body has the inertia of joint lift" in texts(d, "error")
+    assert "does not feel it" not in str(d)
+
+
+def test_a_dozen_sets_are_listed_and_four_of_them_printed():
+    d = diagnose(families.planar_rrr(3, 0, home=True))
+    assert len(d.actuated_sets) == 12
+    printed = str(d).splitlines()
+    first = next(k for k, line in enumerate(printed) if "could drive" in line)
+    assert "determinate reactions" in printed[first + 4]
