@@ -190,3 +190,13 @@ def test_a_rank_is_where_the_spectrum_has_a_clear_gap(
             balance_conditions(mechanisms.four_bar(), "force")
     else:
         assert balance_conditions(mechanisms.four_bar(), "force").rank == rank
+
+
+def test_ratios_that_are_no_simple_fractions_keep_all_their_digits() -> None:
+    """The factor of the crank's first moment is b / a, also where a fraction lies close to it."""
+    a, b = 0.4, 1.1 + 1e-6
+    found = balance_conditions(mechanisms.four_bar((a, b, 0.9, 1.0)), "force")
+    names = list(found.space.names)
+    row = next(row for row in found.reduced if row[names.index("mcx(coupler)")] == 1.0)
+    assert row[names.index("mcx(crank)")] == pytest.approx(-b / a, rel=1e-9)
+    assert row[names.index("mcx(crank)")] != -2.75
