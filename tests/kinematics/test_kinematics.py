@@ -501,3 +501,13 @@ def test_one_loop_at_its_singularity_is_enough_whichever_it_is(lengths):
     N = fb.complement(chain, q)
     np.testing.assert_allclose(N[3 * flat : 3 * flat + 3, flat], fb.complement(parallelogram(), upright)[:, 0])
     assert not N[3 * flat : 3 * flat + 3, 1 - flat].any()
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_the_closure_named_is_the_one_that_stays_open_the_most(off):
+    """Of two loops that share nothing one cannot close; the other does."""
+    lengths = [CRANK_ROCKER, CRANK_ROCKER]
+    lengths[off] = (0.4, 0.3, 0.2, 2.0)
+    with pytest.raises(AssemblyError, match=f"closure pin{off} stays open") as info:
+        fb.assemble(side_by_side(*lengths), [0.8, 0.8])
+    assert info.value.closure == f"pin{off}"

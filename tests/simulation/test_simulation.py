@@ -650,3 +650,50 @@ def test_a_state_that_is_all_but_closed_is_not_closed(off):
         forward_dynamics(chain, batch[[0, 0, 0]], rates)
     a = forward_dynamics(chain, q + 1e-10 * out, v * (1.0 + 1e-10))
     np.testing.assert_allclose(a, forward_dynamics(chain, q, v), rtol=1e-6)
+
+
+def test_no_complement_where_one_of_two_motors_has_lost_its_hold():
+    """Both cranks upright and the distal links in line between them: the motors cannot part their middle."""
+    chain = mechanisms.five_bar((0.5, 0.5, 0.5, 0.5, 1.0))
+    q = 0.5 * np.pi * np.array([1.0, -1.0, 1.0, 1.0])
+    assert np.abs(fb.closure_residual(chain, q)).max() < 1e-15
+    assert np.isnan(simulate(chain, q, np.zeros(4), None, [0.0]).N).all()
+    beside = fb.assemble(chain, q[[0, 2]] + [0.01, 0.1])
+    assert np.isfinite(simulate(chain, beside, np.zeros(4), None, [0.0]).N).all()
+
+
+def test_one_motor_takes_one_number():
+    chain = mechanisms.slider_crank()
+    q, v = state_of(chain)
+    t = [0.0, 0.3]
+    ways = (lambda t, q, v: np.sin(t), lambda t, q, v: [np.sin(t)], lambda t, q, v: np.array([[np.sin(t)]])[0])
+    one, *others = (simulate(chain, q, v, tau, t, rtol=1e-8, atol=1e-10).q for tau in ways)
+    for other in others:
+        np.testing.assert_array_equal(other, one)
+    plain, listed = (simulate(chain, q, v, tau, t, rtol=1e-8, atol=1e-10).q for tau in (0.4, [0.4]))
+    np.testing.assert_array_equal(plain, listed)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"rtol": 1.0}, "rtol = 1.0 but must lie between 0 and 1"),
+        ({"atol": 2.0}, "atol = 2.0 but must lie between 0 and 1"),
+        ({"atol": 0.0}, "atol = 0.0 but must lie between 0 and 1"),
+        ({"initial": "force"}, "must be 'check' or 'project'"),
+    ],
+)
+def test_options_of_a_simulation_are_checked(change, said):
+    chain = mechanisms.slider_crank()
+    q, v = state_of(chain)
+    with pytest.raises(InvalidInputError, match=said):
+        simulate(chain, q, v, None, [0.0, 0.1], **change)
+
+
+def test_progress_is_a_share_of_the_span_whenever_it_begins():
+    chain = mechanisms.slider_crank()
+    q, v = state_of(chain)
+    told: list[float] = []
+    simulate(chain, q, v, None, [7.0, 7.2], progress=told.append)
+    assert 0.0 < told[0] < 0.5
+    assert told[-1] == pytest.approx(1.0, abs=1e-12)
