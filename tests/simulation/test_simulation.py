@@ -9,7 +9,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.dynamics import energy_balance, forward_dynamics
-from fivebar_pin.errors import InvalidInputError, SingularityError, SolverError, UnknownNameError
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError, SolverError, UnknownNameError
 from fivebar_pin.simulation import simulate
 from fivebar_pin.springs import JointSpring, Spring
 
@@ -697,3 +697,10 @@ def test_progress_is_a_share_of_the_span_whenever_it_begins():
     simulate(chain, q, v, None, [7.0, 7.2], progress=told.append)
     assert 0.0 < told[0] < 0.5
     assert told[-1] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_loop_that_cannot_close_is_not_simulated_however_it_begins():
+    chain = mechanisms.four_bar((0.1, 0.2, 0.3, 5.0))
+    with pytest.raises(AssemblyError, match=r"cannot be assembled near the given configuration: closure pin") as info:
+        simulate(chain, np.zeros(3), np.zeros(3), None, [0.0, 0.1], initial="project")
+    assert info.value.residual > 3.0
