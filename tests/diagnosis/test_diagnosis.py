@@ -544,3 +544,10 @@ def test_a_dozen_sets_are_listed_and_four_of_them_printed():
     printed = str(d).splitlines()
     first = next(k for k, line in enumerate(printed) if "could drive" in line)
     assert "determinate reactions" in printed[first + 4]
+
+
+def test_passive_speeds_are_without_bound_at_the_singularity():
+    chain = parallelogram()
+    flat, beside = diagnose(chain, np.zeros(3)), diagnose(chain, [0.01, -0.01, 0.01])
+    assert (flat.sigma, flat.amplification) == (0.0, np.inf)
+    assert 0.9 < beside.amplification < 1.1  # coupler and rocker turn as fast as the crank

@@ -236,6 +236,16 @@ def test_a_sample_on_the_singular_instant_is_what_its_neighbours_say():
     assert motion.worst_closure < 1e-12
 
 
+@pytest.mark.parametrize("off", [1e-6, 1e-4, 1e-3])
+def test_samples_beside_the_singular_instant_are_as_exact_as_others(off):
+    """There the round-off of the closures, magnified by 1 / off^2, would show in the accelerations: they are zero."""
+    chain, q, v = upright()
+    free = chain.with_gravity((0.0, 0.0, 0.0))
+    motion = simulate(free, q, v, None, np.array([0.0, 0.5 * np.pi - off, 0.5 * np.pi + off, 2.0]))
+    np.testing.assert_allclose(motion.a, 0.0, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(motion.v, np.broadcast_to(v, motion.v.shape), rtol=0.0, atol=1e-10)
+
+
 MOVING = {
     "five-bar": lambda: mechanisms.five_bar(base=TILTED),
     "five-bar, continuous joints": lambda: mechanisms.five_bar(joint=pin.JointModelRUBZ),
@@ -483,6 +493,15 @@ def test_a_joint_breaks_loose_when_the_torque_exceeds_its_friction():
     np.testing.assert_allclose(motion.q[:, 0], 0.2 * np.maximum(t - 1.25, 0.0) ** 3, atol=1e-9)
 
 
+def test_a_short_push_on_a_joint_at_rest_is_not_slept_through():
+    """Nothing moves, so nothing limits the steps but that what acts must be looked at: 0.1 s out of 3 break it loose."""
+    chain = with_dry_friction(pendulum(), 0.5)
+    motion = simulate(chain, [0.0], [0.0], lambda t, q, v: [1.2 * np.exp(-(((t - 1.5) / 0.05) ** 2))], [0.0, 1.0, 3.0])
+    assert abs(motion.q[1, 0]) < 1e-12
+    assert motion.q[2, 0] > 0.01
+    np.testing.assert_array_equal(motion.v[2], 0.0)
+
+
 def test_a_linkage_comes_to_rest_by_friction_joint_by_joint():
     """Energy only falls, its account is kept, and in the end everything stands still without gravity."""
     chain = with_dry_friction(mechanisms.five_bar(), 2.0).with_gravity(np.zeros(3))
@@ -508,6 +527,7 @@ def test_a_joint_may_stick_while_the_rest_of_the_mechanism_moves():
     v = fb.complement(chain, q) @ np.array([1.0, 0.0])
     motion = simulate(sticky, q, v, None, np.linspace(0.0, 1.0, 11))
     np.testing.assert_allclose(motion.q[:, held], q[held], atol=1e-10)
+    np.testing.assert_array_equal(motion.v[:, held], 0.0)  # at rest, not nearly so
     assert np.ptp(motion.q[:, 0]) > 0.1
     assert energy_balance(sticky, motion).drift() < 1e-9
 
