@@ -22,6 +22,7 @@ from mechanisms import (
     point,
     rscr,
     rssr,
+    side_by_side,
     slider_crank,
     welded_four_bar,
 )
@@ -551,3 +552,11 @@ def test_passive_speeds_are_without_bound_at_the_singularity():
     flat, beside = diagnose(chain, np.zeros(3)), diagnose(chain, [0.01, -0.01, 0.01])
     assert (flat.sigma, flat.amplification) == (0.0, np.inf)
     assert 0.9 < beside.amplification < 1.1  # coupler and rocker turn as fast as the crank
+
+
+def test_only_sets_that_determine_the_motion_are_listed():
+    """Two four-bars that share nothing need a motor each, on any of their joints: nine pairs of fifteen."""
+    d = diagnose(side_by_side((0.4, 1.1, 0.9, 1.0), (0.4, 1.1, 0.9, 1.0)))
+    assert len(d.actuated_sets) == 9
+    assert all({name[-1] for name in option.joints} == {"0", "1"} for option in d.actuated_sets)
+    assert min(option.sigma for option in d.actuated_sets) > 1e-3

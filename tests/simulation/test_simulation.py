@@ -494,7 +494,7 @@ def test_a_joint_breaks_loose_when_the_torque_exceeds_its_friction():
 
 
 def test_a_short_push_on_a_joint_at_rest_is_not_slept_through():
-    """Nothing moves, so nothing limits the steps but that what acts must be looked at: 0.1 s out of 3 break it loose."""
+    """Nothing moves, so nothing limits the steps but that what acts must be looked at: 0.1 s of 3 break it loose."""
     chain = with_dry_friction(pendulum(), 0.5)
     motion = simulate(chain, [0.0], [0.0], lambda t, q, v: [1.2 * np.exp(-(((t - 1.5) / 0.05) ** 2))], [0.0, 1.0, 3.0])
     assert abs(motion.q[1, 0]) < 1e-12
