@@ -724,3 +724,13 @@ def test_a_loop_that_cannot_close_is_not_simulated_however_it_begins():
     with pytest.raises(AssemblyError, match=r"cannot be assembled near the given configuration: closure pin") as info:
         simulate(chain, np.zeros(3), np.zeros(3), None, [0.0, 0.1], initial="project")
     assert info.value.residual > 3.0
+
+
+def test_a_mechanism_that_is_nearly_singular_all_along_is_simulated_as_any_other():
+    """Two long links on a short crank and ground: they are nearly parallel wherever the crank is."""
+    chain = mechanisms.four_bar((0.01, 1.0, 1.0, 0.02)).with_gravity(np.zeros(3))
+    q = fb.assemble(chain, [0.8])
+    v = fb.complement(chain, q) @ np.array([2.0])
+    motion = simulate(chain, q, v, None, np.linspace(0.0, 2.0, 9))
+    assert energy_balance(chain, motion).drift() < 1e-9
+    assert np.ptp(motion.q[:, 0]) > 1.0
