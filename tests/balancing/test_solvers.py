@@ -374,3 +374,21 @@ def test_the_scaling_of_a_cone_takes_its_unit_to_the_point_and_stays_inside(cone
         W = scaling(cone, z)
         np.testing.assert_allclose(W @ unit, z, atol=1e-7)
         assert outside(cone, W @ projected(cone, rng.normal(size=6))) < 1e-7
+
+
+@pytest.mark.parametrize("region", [Ball(0.1, (0.02, -0.03, 0.0)), Box((0.2, 0.1, 0.1), center=(0.03, 0.0, 0.0))])
+@pytest.mark.parametrize("remove", [(), ("theta_psi", "phi_gamma")], ids=["added", "removed"])
+def test_no_solution_is_larger_than_the_sizes_that_bounds_are_taken_over(
+    region: object, remove: tuple[str, ...]
+) -> None:
+    """In any direction: a proof within sizes that solutions do not keep would prove nothing."""
+    chain, _ = balance_problems.moved("five_bar_case_I")
+    problem = balance_problem(chain, None, region=region, masses=(0.0, 0.5), remove=remove, material=None)
+    program, rng = problem.program, np.random.default_rng(5)
+    assert np.isfinite(problem.sizes).all()
+    largest = np.zeros(problem.n)
+    for _ in range(20):
+        x = solve(program, np.zeros(program.n), rng.normal(size=program.n) * np.exp(rng.normal(size=program.n))).x
+        assert x is not None
+        largest = np.maximum(largest, np.abs(x[: problem.n]))
+    assert (largest <= problem.sizes * (1.0 + 1e-6) + 1e-9).all()

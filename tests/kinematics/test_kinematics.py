@@ -9,12 +9,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mechanisms import (
     TILTED,
+    add,
+    at,
     bennett,
     double_four_bar,
     five_bar,
     four_bar,
     four_bar_angles,
     parallelogram,
+    point,
     rscr,
     rssr,
     side_by_side,
@@ -501,3 +504,69 @@ def test_one_loop_at_its_singularity_is_enough_whichever_it_is(lengths):
     N = fb.complement(chain, q)
     np.testing.assert_allclose(N[3 * flat : 3 * flat + 3, flat], fb.complement(parallelogram(), upright)[:, 0])
     assert not N[3 * flat : 3 * flat + 3, 1 - flat].any()
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_the_closure_named_is_the_one_that_stays_open_the_most(off):
+    """Of two loops that share nothing one cannot close; the other does."""
+    lengths = [CRANK_ROCKER, CRANK_ROCKER]
+    lengths[off] = (0.4, 0.3, 0.2, 2.0)
+    with pytest.raises(AssemblyError, match=f"closure pin{off} stays open") as info:
+        fb.assemble(side_by_side(*lengths), [0.8, 0.8])
+    assert info.value.closure == f"pin{off}"
+
+
+@pytest.mark.parametrize("size", [1.0, 1e3, 1e6])
+def test_closed_is_relative_to_the_length_of_a_large_mechanism(size):
+    """Rounding of coordinates of a thousand kilometres is a tenth of a nanometre: no gap."""
+    lengths = tuple(size * x for x in CRANK_ROCKER)
+    chain = four_bar(lengths)
+    q = fb.assemble(chain, [0.8])
+    np.testing.assert_allclose(np.abs(fb.closure_residual(chain, q)).max(), 0.0, rtol=0.0, atol=1e-12 * size)
+    moved = fb.drive(chain, turning(0.8, 1.8, 20), q)
+    np.testing.assert_allclose(moved.v, fb.drive(four_bar(), turning(0.8, 1.8, 20), q).v, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("crossing", [0, 1])
+def test_a_change_of_mode_shows_in_whichever_loop_it_is(crossing):
+    """Two spherical loops side by side: the one turns through a bifurcation, the other rests."""
+    arcs = [(0.5, 1.2, 1.0, 1.1), (0.5, 1.2, 1.0, 1.1)]
+    arcs[crossing] = (0.5, 1.0, 0.5, 1.0)
+    model, closures = pin.Model(), []
+    for k, own in enumerate(arcs):
+        part = spherical_four_bar(own, base=at(3.0 * k))
+        ids = [0]
+        for j in range(1, part.model.njoints):
+            parent = ids[part.model.parents[j]]
+            ids.append(
+                add(
+                    model,
+                    parent,
+                    part.model.joints[j],
+                    part.model.jointPlacements[j],
+                    f"{part.model.names[j]}{k}",
+                    part.model.inertias[j],
+                )
+            )
+        names = []
+        for name in part.closures[0].frames:
+            frame = part.model.frames[part.model.getFrameId(name)]
+            names.append(point(model, ids[frame.parentJoint], f"{name}{k}", frame.placement))
+        closures.append(fb.Closure((names[0], names[1]), name=f"pin{k}"))
+    chain = fb.ClosedChain(model, tuple(closures), ("crank0", "crank1"))
+    start = np.concatenate([fb.assembly_modes(spherical_four_bar(own), [0.4])[0] for own in arcs])
+    t = np.linspace(0.0, 1.0, 41)
+    ways = [laws.constant(t, 0.4), laws.constant(t, 0.4)]
+    ways[1 - crossing] = laws.cycloidal(t, 0.4, 0.4 + 2.0 * np.pi)
+    fb.drive(chain, laws.combine(*ways), start)
+    ways = ways[::-1]
+    with pytest.raises(SingularityError, match="type 2 singularity"):
+        fb.drive(chain, laws.combine(*ways), start)
+
+
+def test_closed_is_one_measure_for_lengths_and_angles_of_a_small_mechanism():
+    """Of a micrometre, a gap of 1e-12 m would be a millionth: angles cannot be better than rounding, lengths are."""
+    chain = five_bar(tuple(1e-6 * a for a in (0.5, 1.2, 1.0, 0.6, 0.9)), base=TILTED, kind="revolute")
+    q = fb.assemble(chain, [2.0, 1.0])
+    assert np.abs(fb.closure_residual(chain, q)[:3]).max() < 1e-18
+    assert fb.drive(chain, swinging(2.0, 1.0), q).worst_closure < 1e-14

@@ -9,7 +9,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.dynamics import energy_balance, forward_dynamics
-from fivebar_pin.errors import InvalidInputError, SingularityError, SolverError, UnknownNameError
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError, SolverError, UnknownNameError
 from fivebar_pin.simulation import simulate
 from fivebar_pin.springs import JointSpring, Spring
 
@@ -234,6 +234,16 @@ def test_a_sample_on_the_singular_instant_is_what_its_neighbours_say():
     np.testing.assert_allclose(place, np.stack([np.sin(t), np.cos(t)], axis=1), atol=1e-9)
     np.testing.assert_allclose(motion.v, np.broadcast_to(v, motion.v.shape), atol=1e-9)
     assert motion.worst_closure < 1e-12
+
+
+@pytest.mark.parametrize("off", [1e-6, 1e-4, 1e-3])
+def test_samples_beside_the_singular_instant_are_as_exact_as_others(off):
+    """There the round-off of the closures, magnified by 1 / off^2, would show in the accelerations: they are zero."""
+    chain, q, v = upright()
+    free = chain.with_gravity((0.0, 0.0, 0.0))
+    motion = simulate(free, q, v, None, np.array([0.0, 0.5 * np.pi - off, 0.5 * np.pi + off, 2.0]))
+    np.testing.assert_allclose(motion.a, 0.0, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(motion.v, np.broadcast_to(v, motion.v.shape), rtol=0.0, atol=1e-10)
 
 
 MOVING = {
@@ -484,6 +494,15 @@ def test_a_joint_breaks_loose_when_the_torque_exceeds_its_friction():
     np.testing.assert_allclose(motion.q[:, 0], 0.2 * np.maximum(t - 1.25, 0.0) ** 3, atol=1e-9)
 
 
+def test_a_short_push_on_a_joint_at_rest_is_not_slept_through():
+    """Nothing moves, so nothing limits the steps but that what acts must be looked at: 0.1 s of 3 break it loose."""
+    chain = with_dry_friction(pendulum(), 0.5)
+    motion = simulate(chain, [0.0], [0.0], lambda t, q, v: [1.2 * np.exp(-(((t - 1.5) / 0.05) ** 2))], [0.0, 1.0, 3.0])
+    assert abs(motion.q[1, 0]) < 1e-12
+    assert motion.q[2, 0] > 0.01
+    np.testing.assert_array_equal(motion.v[2], 0.0)
+
+
 def test_a_linkage_comes_to_rest_by_friction_joint_by_joint():
     """Energy only falls, its account is kept, and in the end everything stands still without gravity."""
     chain = with_dry_friction(mechanisms.five_bar(), 2.0).with_gravity(np.zeros(3))
@@ -509,6 +528,7 @@ def test_a_joint_may_stick_while_the_rest_of_the_mechanism_moves():
     v = fb.complement(chain, q) @ np.array([1.0, 0.0])
     motion = simulate(sticky, q, v, None, np.linspace(0.0, 1.0, 11))
     np.testing.assert_allclose(motion.q[:, held], q[held], atol=1e-10)
+    np.testing.assert_array_equal(motion.v[:, held], 0.0)  # at rest, not nearly so
     assert np.ptp(motion.q[:, 0]) > 0.1
     assert energy_balance(sticky, motion).drift() < 1e-9
 
@@ -649,3 +669,67 @@ def test_a_state_that_is_all_but_closed_is_not_closed(off):
         forward_dynamics(chain, batch[[0, 0, 0]], rates)
     a = forward_dynamics(chain, q + 1e-10 * out, v * (1.0 + 1e-10))
     np.testing.assert_allclose(a, forward_dynamics(chain, q, v), rtol=1e-6)
+
+
+def test_no_complement_where_one_of_two_motors_has_lost_its_hold():
+    """Both cranks upright and the distal links in line between them: the motors cannot part their middle."""
+    chain = mechanisms.five_bar((0.5, 0.5, 0.5, 0.5, 1.0))
+    q = 0.5 * np.pi * np.array([1.0, -1.0, 1.0, 1.0])
+    assert np.abs(fb.closure_residual(chain, q)).max() < 1e-15
+    assert np.isnan(simulate(chain, q, np.zeros(4), None, [0.0]).N).all()
+    beside = fb.assemble(chain, q[[0, 2]] + [0.01, 0.1])
+    assert np.isfinite(simulate(chain, beside, np.zeros(4), None, [0.0]).N).all()
+
+
+def test_one_motor_takes_one_number():
+    chain = mechanisms.slider_crank()
+    q, v = state_of(chain)
+    t = [0.0, 0.3]
+    ways = (lambda t, q, v: np.sin(t), lambda t, q, v: [np.sin(t)], lambda t, q, v: np.array([[np.sin(t)]])[0])
+    one, *others = (simulate(chain, q, v, tau, t, rtol=1e-8, atol=1e-10).q for tau in ways)
+    for other in others:
+        np.testing.assert_array_equal(other, one)
+    plain, listed = (simulate(chain, q, v, tau, t, rtol=1e-8, atol=1e-10).q for tau in (0.4, [0.4]))
+    np.testing.assert_array_equal(plain, listed)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"rtol": 1.0}, "rtol = 1.0 but must lie between 0 and 1"),
+        ({"atol": 2.0}, "atol = 2.0 but must lie between 0 and 1"),
+        ({"atol": 0.0}, "atol = 0.0 but must lie between 0 and 1"),
+        ({"initial": "force"}, "must be 'check' or 'project'"),
+    ],
+)
+def test_options_of_a_simulation_are_checked(change, said):
+    chain = mechanisms.slider_crank()
+    q, v = state_of(chain)
+    with pytest.raises(InvalidInputError, match=said):
+        simulate(chain, q, v, None, [0.0, 0.1], **change)
+
+
+def test_progress_is_a_share_of_the_span_whenever_it_begins():
+    chain = mechanisms.slider_crank()
+    q, v = state_of(chain)
+    told: list[float] = []
+    simulate(chain, q, v, None, [7.0, 7.2], progress=told.append)
+    assert 0.0 < told[0] < 0.5
+    assert told[-1] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_loop_that_cannot_close_is_not_simulated_however_it_begins():
+    chain = mechanisms.four_bar((0.1, 0.2, 0.3, 5.0))
+    with pytest.raises(AssemblyError, match=r"cannot be assembled near the given configuration: closure pin") as info:
+        simulate(chain, np.zeros(3), np.zeros(3), None, [0.0, 0.1], initial="project")
+    assert info.value.residual > 3.0
+
+
+def test_a_mechanism_that_is_nearly_singular_all_along_is_simulated_as_any_other():
+    """Two long links on a short crank and ground: they are nearly parallel wherever the crank is."""
+    chain = mechanisms.four_bar((0.01, 1.0, 1.0, 0.02)).with_gravity(np.zeros(3))
+    q = fb.assemble(chain, [0.8])
+    v = fb.complement(chain, q) @ np.array([2.0])
+    motion = simulate(chain, q, v, None, np.linspace(0.0, 2.0, 9))
+    assert energy_balance(chain, motion).drift() < 1e-9
+    assert np.ptp(motion.q[:, 0]) > 1.0
