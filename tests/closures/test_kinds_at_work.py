@@ -77,8 +77,8 @@ def test_energy_is_kept_in_free_motion(name):
     free = fb.simulate(chain, q, np.zeros(chain.nv), np.zeros(chain.na), t)
     energy = fb.energy_balance(chain, free)
     total = energy.kinetic + energy.potential
-    assert free.closure_residual.max() < 1e-11
-    assert np.abs(total - total[0]).max() < 1e-7 * max(1.0, np.abs(energy.kinetic).max())
+    assert free.closure_residual.max() < 1e-13
+    assert np.abs(total - total[0]).max() < 1e-10 * max(1.0, np.abs(energy.kinetic).max())
     assert energy.kinetic.max() > 1e-3
 
 
