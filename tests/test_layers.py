@@ -26,7 +26,7 @@ ORDER = (
     ("mechanism",),
     ("kinematics", "dynamics"),
     ("simulation", "diagnosis", "balancing", "io", "paper"),
-    ("shipped",),
+    ("shipped", "planar"),
     ("viz",),
     ("cli",),
     ("__main__",),

@@ -16,6 +16,10 @@ TINY = 1e-300
 """Least divisor: smaller than any size met, so that a quotient of nothing by nothing is nothing [any unit]."""
 
 
+TINY = 1e-300
+"""Least divisor: x / max(y, TINY) is huge where y is zero, and no number is none [any unit]."""
+
+
 def table_text(header: str, body: Array) -> str:
     """Return a table (n, k) as csv text below a header line, every digit kept."""
     text = io.StringIO()

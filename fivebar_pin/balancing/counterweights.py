@@ -20,14 +20,14 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, figures, frozen
-from fivebar_pin.balancing._making import arm_width
-from fivebar_pin.balancing._parameters import Space, plane_axes
-from fivebar_pin.balancing._quantities import reflected_inertia
-from fivebar_pin.balancing._terms import base, measure_of
+from fivebar_pin.balancing.counterweight_search import arm_width
 from fivebar_pin.balancing.design import Change, Design
-from fivebar_pin.balancing.pieces import Bar, Disc, Piece, Sphere, ball_radius, density_of, thickness_of
+from fivebar_pin.balancing.objectives.term import base, measure_of
+from fivebar_pin.balancing.parameters import Space, plane_axes
+from fivebar_pin.balancing.pieces.piece import Bar, Disc, Piece, Sphere, ball_radius, density_of, thickness_of
 from fivebar_pin.balancing.problem import assembled
-from fivebar_pin.balancing.regions import Ball, resolve
+from fivebar_pin.balancing.regions.region import Ball, resolve
+from fivebar_pin.balancing.regressors.measures import reflected_inertia
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 

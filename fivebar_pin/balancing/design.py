@@ -11,17 +11,17 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, figures, settled
-from fivebar_pin.balancing._parameters import Space
-from fivebar_pin.balancing._quantities import Rows
-from fivebar_pin.balancing._terms import measure_of
 from fivebar_pin.balancing.conditions import BalanceConditions
-from fivebar_pin.balancing.pieces import Piece
+from fivebar_pin.balancing.objectives.term import measure_of
+from fivebar_pin.balancing.parameters import Space
+from fivebar_pin.balancing.pieces.piece import Piece
+from fivebar_pin.balancing.regressors.measures import Rows
 from fivebar_pin.balancing.solvers import Certificate
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InfeasibleError
 
 if TYPE_CHECKING:
-    from fivebar_pin.balancing._given import Given
+    from fivebar_pin.balancing.given import Given
 
 PROVED = 1e-5  # gap at which a design counts as optimal [of the objective or its typical size]
 __all__ = ["Certificate", "Change", "Design"]

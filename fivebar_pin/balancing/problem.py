@@ -3,7 +3,7 @@
 With x the parameters of the mechanism and delta, rho the material added and removed,
 
     x = x_0 + delta - rho,     delta, rho, x_0 - rho physical, delta and rho within their regions
-    B x = 0                    the balancing conditions
+    B x + b = 0                the balancing conditions, b = 0 without springs
 
 or x itself physical, within its region and within mass bounds (redesign). Every term of the objective is linear in x
 or a length of a vector linear in x, so the problem is a conic one: its optimum is global, its dual bounds it from
@@ -20,22 +20,23 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked, frozen
-from fivebar_pin.balancing import _empty, _extent, _lift
-from fivebar_pin.balancing._given import Given
-from fivebar_pin.balancing._making import Maker, Sizes
-from fivebar_pin.balancing._material import Material
-from fivebar_pin.balancing._objective import OVERREACH, TermMaker, overreach, weights_of
-from fivebar_pin.balancing._parameters import Space
-from fivebar_pin.balancing._quantities import MEASURES, Motions, Rows, measure, trajectories
-from fivebar_pin.balancing._sampling import SpaceName, random_samples, space_of
-from fivebar_pin.balancing._setup import MassBounds, Setup
-from fivebar_pin.balancing._terms import Term, base, check_terms, measure_of, positive_limit
+from fivebar_pin.balancing import facial_reduction, lifting
 from fivebar_pin.balancing.conditions import KINDS, BalanceConditions, conditions_for
+from fivebar_pin.balancing.counterweight_search import Maker, Sizes
 from fivebar_pin.balancing.design import PROVED, Asked, Design
-from fivebar_pin.balancing.pieces import Piece, density_of, thickness_of
-from fivebar_pin.balancing.regions import Region
+from fivebar_pin.balancing.given import Given
+from fivebar_pin.balancing.objectives.making import OVERREACH, TermMaker, overreach, weights_of
+from fivebar_pin.balancing.objectives.term import Term, base, check_terms, measure_of, positive_limit
+from fivebar_pin.balancing.parameters import Space
+from fivebar_pin.balancing.pieces.piece import Piece, density_of, thickness_of
+from fivebar_pin.balancing.regions.region import Region
+from fivebar_pin.balancing.regressors.measures import MEASURES, Motions, Rows, measure, trajectories
+from fivebar_pin.balancing.sampling import SpaceName, random_samples, space_of
+from fivebar_pin.balancing.setting import MassBounds, Setup
 from fivebar_pin.balancing.solvers import DEFAULT, SECOND, Block, Certificate, Outcome, Program, solve, solver_named
 from fivebar_pin.balancing.solvers.cones import outside
+from fivebar_pin.balancing.variables import sizes as variable_sizes
+from fivebar_pin.balancing.variables.material import Material
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
@@ -304,7 +305,7 @@ class BalanceProblem(Immutable):
         for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
             y, residual = self._exact(x, drop)
             y = self._compact(y, felt)  # again: inertias about centres that have moved a hair
-            parts = _lift.lift(self, y)
+            parts = lifting.lift(self, y)
             if residual <= _EXACT and parts.lowest >= -_PHYSICAL:
                 break
         else:
@@ -362,8 +363,9 @@ class BalanceProblem(Immutable):
             The variables and the largest residual left, scaled.
         """
         B = np.zeros((0, self.X0.size)) if self.conditions is None else self.conditions.basis
+        held = np.zeros(len(B)) if self.conditions is None else self.conditions.offset / self.mass
         A = np.concatenate([B @ self.E, self.fixed[:, :-1]])
-        b = np.concatenate([B @ self.X0, -self.fixed[:, -1]])
+        b = np.concatenate([B @ self.X0 + held, -self.fixed[:, -1]])
         mass = np.array([abs(float(y[m.start])) for m in self.materials])
         share = np.where((mass < drop) | np.array(self.gone), 0.0, np.maximum(mass, 1e-9))
         share = np.repeat(share, [m.size for m in self.materials])
@@ -492,7 +494,7 @@ def assembled(
         given.bodies, given.removable, given.region, given.counterweight, given.density, sizes or {}, elastic=elastic
     )
     E, X0 = setup.map(materials)
-    full_E = _lift.linear(chain, space, setup.mass, materials)
+    full_E = lifting.linear(chain, space, setup.mass, materials)
     present = chain.inertial_parameters + arms
     if given.mode == "redesign":
         present[[m.body for m in materials]] = 0.0
@@ -504,7 +506,7 @@ def assembled(
         terms[OVERREACH] = overreach(materials, n)
     limited = maker.limits(given.limits)
     blocks, caps = setup.constraints(materials, E, X0, given.masses), tuple(setup.caps(materials, given.masses, n))
-    gone = _empty.empty(blocks, materials, n)
+    gone = facial_reduction.empty(blocks, materials, n)
     return BalanceProblem(
         chain=chain,
         kind=given.kind,
@@ -518,12 +520,12 @@ def assembled(
         limits=dict(given.limits),
         E=frozen(E),
         X0=frozen(X0),
-        program=Program(n, _empty.without([*blocks, *limited], materials, gone, n)),
+        program=Program(n, facial_reduction.without([*blocks, *limited], materials, gone, n)),
         fixed=frozen(setup.fixed(materials, given.masses, n)),
         limited=tuple(limited),
         caps=caps,
         mass=setup.mass,
-        sizes=frozen(_extent.extents(materials, gone, [*blocks, *caps], n)),
+        sizes=frozen(variable_sizes.extents(materials, gone, [*blocks, *caps], n)),
         near=given.near,
         given=given,
         arms=frozen(arms),

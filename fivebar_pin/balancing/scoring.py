@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked, figures, finite, frozen, reals
-from fivebar_pin.balancing._quantities import Motions, Rows, measure, reflected_inertia, trajectories
-from fivebar_pin.balancing._terms import LINEAR, TERMS, base, check_terms, measure_of
+from fivebar_pin.balancing.objectives.term import LINEAR, TERMS, base, check_terms, measure_of
+from fivebar_pin.balancing.regressors.measures import Motions, Rows, measure, reflected_inertia, trajectories
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory

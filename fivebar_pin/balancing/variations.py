@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fivebar_pin._arrays import Array, frozen, integer, number, require_memory
-from fivebar_pin.balancing._parameters import from_pseudo_inertia, pseudo_inertia
+from fivebar_pin.balancing.parameters import from_pseudo_inertia, pseudo_inertia
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
 

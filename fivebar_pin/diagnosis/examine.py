@@ -57,7 +57,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     sets = mobility.determining_sets(chain, generic if here.rank < generic.rank else here, _SETS)
     redundant = _redundant_rows(loops, here, generic)
     sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
-    joints, closures = _determinate(chain, here.q[0])
+    joints, closures, multipliers = _determinate(chain, here.q[0])
     findings += _about_mobility(chain, here, generic, redundant)
     findings += _about_actuation(chain, actuation, undetermined, excess, sets, generic)
     findings += _about_singularity(chain, here, generic, actuation, sigma)
@@ -83,8 +83,10 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         amplification=_amplification(loops, here.J[0], sigma),
         determinate_joints=joints,
         determinate_closures=closures,
+        determinate_rows=multipliers,
         joints=chain.joints,
         closures=tuple(c.name for c in chain.closures),
+        springs=tuple(s.name for s in chain.springs),
         problems=tuple(sorted(findings, key=lambda f: _ORDER.index(f.severity))),
     )
 
@@ -173,17 +175,23 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
     return float(np.abs(passive.solve(scaled[:, loops.actuated].T, loops.passive.size)).max())
 
 
-def _determinate(chain: ClosedChain, q: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Return which reaction components of joints and closures are not marked as open."""
+def _determinate(
+    chain: ClosedChain, q: Array
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], tuple[tuple[str, ...], ...]]:
+    """Return which reaction components of joints and closures, and which rows of these, are not marked as open."""
     rest = np.zeros((1, chain.nv))
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
-    found = reactions(chain, still, rest, np.zeros((1, chain.na)), {}, ())
-    out = []
-    for reaction in (found.joint_local[0], found.closure_local[0]):
-        mask = np.isfinite(reaction)
+    bare = chain.with_springs(()) if chain.springs else chain  # what is open does not depend on what pulls
+    found = reactions(bare, still, rest, np.zeros((1, chain.na)), {})
+    joints, closures = np.isfinite(found.joint_local[0]), np.isfinite(found.closure_local[0])
+    closures[[not c.ends for c in chain.closures]] = False  # a coupling of joints has no wrench
+    for mask in (joints, closures):
         mask.setflags(write=False)
-        out.append(mask)
-    return out[0], out[1]
+    rows = [
+        tuple(name for name, yes in zip(c.closure.row_names, found.determinate_rows[0, c.rows], strict=True) if yes)
+        for c in loops_of(chain).anchored
+    ]
+    return joints, closures, tuple(rows)
 
 
 def _jump(chain: ClosedChain, here: Configurations, generic: Configurations, where: str) -> str:
@@ -214,7 +222,7 @@ def _about_mobility(
             "only with these exact dimensions; loosen the closure if that is not meant.",
         )
     for closure, anchored in zip(chain.closures, loops_of(chain).anchored, strict=True):
-        if not anchored.moved.size:
+        if not anchored.columns.size:
             yield Finding("warning", f"closure {closure.name} joins bodies that no joint moves apart: it holds nothing")
 
 
@@ -270,7 +278,7 @@ def _about_parts(chain: ClosedChain, here: Configurations, generic: Configuratio
     loops, model = loops_of(chain), chain.model
     looped = np.zeros(chain.nv, dtype=np.bool_)
     for anchored in loops.anchored:
-        looped[anchored.moved] = True
+        looped[anchored.columns] = True
     looped[loops.actuated] = True
     loose = _owners(chain, np.flatnonzero(~looped))
     if loose and chain.na:
@@ -325,7 +333,7 @@ def _parts(chain: ClosedChain) -> list[tuple[str, ...]]:
         return j
 
     links = [(j, int(model.parents[j])) for j in range(1, model.njoints)]
-    links += [anchored.joints for anchored in loops_of(chain).anchored]
+    links += [pair for c in loops_of(chain).anchored for pair in zip(c.tied, c.tied[1:], strict=False)]
     for a, b in links:
         if a and b:
             group[find(a)] = find(b)

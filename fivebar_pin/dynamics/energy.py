@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,6 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import Bodies, body_rates, gravity_wrenches, rotor_energy
 from fivebar_pin.dynamics.equations import EquationsOfMotion
 from fivebar_pin.dynamics.wrenches import checked_wrenches
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["EnergyBalance", "energy_balance"]
@@ -73,7 +72,6 @@ def energy_balance(
     trajectory: Trajectory,
     *,
     torque: npt.ArrayLike | None = None,
-    springs: Iterable[Spring | JointSpring] = (),
     external: Mapping[str, npt.ArrayLike] | None = None,
 ) -> EnergyBalance:
     """Account for the energy along a trajectory, body by body.
@@ -82,13 +80,12 @@ def energy_balance(
         chain: the mechanism.
         trajectory: of this chain.
         torque: of the actuated joints (na,) or (n, na), as it was applied [N m or N]; None for none.
-        springs: as they were simulated.
         external: wrenches (6,) or (n, 6) by frame, as they were applied.
 
     Returns:
         Energies, their rate, and the powers supplied and dissipated.
     """
-    system, n, v = EquationsOfMotion.of(chain, tuple(springs)), len(trajectory), trajectory.v
+    system, n, v = EquationsOfMotion.of(chain), len(trajectory), trajectory.v
     given = np.zeros(chain.na) if torque is None else numeric("torque", torque)
     tau = checked(
         "torque", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na)

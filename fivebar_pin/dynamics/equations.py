@@ -20,14 +20,12 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
-from fivebar_pin.closures import ClosureKind
-from fivebar_pin.dynamics.elastic import SpringForces, checked_springs, spring_forces
+from fivebar_pin.dynamics.elastic import SpringForces, spring_forces
 from fivebar_pin.dynamics.mass import depth_first, mass_matrix
 from fivebar_pin.dynamics.wrenches import moved_to_origin
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.manifold import Manifold, manifold_of
-from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["STICKING", "EquationsOfMotion", "ReducedEquations", "Slip"]
 
@@ -69,30 +67,27 @@ class ReducedEquations:
 
 @dataclass(frozen=True, eq=False)
 class EquationsOfMotion:
-    """A chain with its springs, ready to give accelerations.
+    """A chain, ready to give accelerations.
 
     Attributes:
         chain, manifold: the mechanism and its closed configurations.
-        springs: checked against the chain.
         damping, friction: viscous coefficients and dry friction torques of the joints (nv,).
         data: Pinocchio's workspace, this object's own.
     """
 
     chain: ClosedChain
     manifold: Manifold
-    springs: tuple[Spring | JointSpring, ...]
     damping: Array
     friction: Array
     data: pin.Data
 
     @staticmethod
-    def of(chain: ClosedChain, springs: tuple[Spring | JointSpring, ...]) -> EquationsOfMotion:
-        """Prepare a chain; checks the springs."""
+    def of(chain: ClosedChain) -> EquationsOfMotion:
+        """Prepare a chain."""
         model = chain.model
         return EquationsOfMotion(
             chain,
             manifold_of(chain),
-            checked_springs(chain, springs),
             np.array(model.damping),
             np.array(model.upperDryFrictionLimit),
             model.createData(),
@@ -126,7 +121,7 @@ class EquationsOfMotion:
         M, bias = self._mass_and_bias(point.q, v)
         N = point.independent.tangent(rank) * scale[:, None]  # (n, nv, f)
         force = applied - bias - self.damping * v
-        if self.springs:
+        if self.chain.springs:
             force = force + self.spring_forces(point, v).force
         held = np.zeros_like(v)
         if rank:
@@ -138,7 +133,7 @@ class EquationsOfMotion:
 
     def spring_forces(self, point: Configurations, v: Array) -> SpringForces:
         """Return what the springs do at states (n)."""
-        return spring_forces(self.chain, self.manifold.loops, self.springs, point.q, v, point.poses)
+        return spring_forces(self.chain, self.manifold.loops, point.q, v, point.poses)
 
     def wrench_forces(self, point: Configurations, external: Mapping[str, Array]) -> Array:
         """Return the generalised forces (n, nv) of wrenches (n, 6) on frames."""
@@ -155,7 +150,7 @@ class EquationsOfMotion:
     def _drift(self, point: Configurations, v: Array) -> Array:
         """Return the second rate of the closures at zero joint accelerations (n, m), the loops being closed."""
         loops, n = self.manifold.loops, v.shape[0]
-        if n > _FEW or any(c.kind is not ClosureKind.POINT for c in self.chain.closures):
+        if n > _FEW or not all(c.by_points for c in self.chain.closures):
             return loops.drift(point.pairs, loops.tree.rates(point.q, v, point.poses))
         model, data, out, still = self.chain.model, self.data, np.empty((n, loops.m)), np.zeros(self.chain.nv)
         for i in range(n):
@@ -173,7 +168,7 @@ class EquationsOfMotion:
         """Frame numbers of every closure."""
         model = self.chain.model
         named = frames_by_name(model)
-        found = [[named[name] for name in c.frames] for c in self.chain.closures]
+        found = [[named[name] for name in c.ends] for c in self.chain.closures]
         return [(model.getFrameId(f.name, f.type), model.getFrameId(g.name, g.type)) for f, g in found]
 
     def _mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ Accelerations come from the null space of the closure Jacobian, so every mobilit
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,6 @@ from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.closing import closed_enough
 from fivebar_pin.mechanism.configurations import Configurations
-from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["constant_torque", "forward_dynamics", "require_closed", "require_consistent"]
 
@@ -33,11 +32,10 @@ def forward_dynamics(
     tau: npt.ArrayLike | None = None,
     *,
     external: Mapping[str, npt.ArrayLike] | None = None,
-    springs: Iterable[Spring | JointSpring] = (),
 ) -> Array:
     """Compute the joint accelerations of the closed chain, a = N w + a_c with (N^T M N) w = N^T (...).
 
-    Gravity, armature, viscous damping and dry friction are taken from the chain's model; dry friction is -f sign(v),
+    Gravity, armature, viscous damping, dry friction and springs are taken from the chain; dry friction is -f sign(v),
     none at rest, as in `inverse_dynamics` (`simulate` lets joints stick). The mechanism may have any number of motors:
     the tangent space of the closures is used, not the actuated joints.
 
@@ -49,7 +47,6 @@ def forward_dynamics(
             unless given.
         external: forces from outside: frame name -> wrench (6,) or (n, 6), force [N] and moment [N m] in world axes at
             the frame's origin.
-        springs: springs and dampers.
 
     Returns:
         Accelerations (nv,) or (n, nv) [rad/s2 or m/s2].
@@ -57,8 +54,9 @@ def forward_dynamics(
     Raises:
         InvalidInputError: wrong shapes; q not closed or v not consistent with the closures; a motion without inertia.
         SingularityError: q is a bifurcation, where the motion is not determined.
+        SolverError: a spring whose ends meet has a force of no direction.
     """
-    system = EquationsOfMotion.of(chain, tuple(springs))
+    system = EquationsOfMotion.of(chain)
     Q = numeric("q", q)
     single = Q.ndim == 1
     Q = checked("q", np.atleast_2d(Q), (None, chain.nq))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from fivebar_pin.dynamics.reactions import Reactions, determinate, reactions
 from fivebar_pin.dynamics.wrenches import moved_to_origin
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Loads"]
@@ -36,7 +36,6 @@ class Loads(Immutable):
         about: the point the moments refer to (3,) [m].
         chain, trajectory: what the loads belong to.
         external: wrenches (n, 6) by frame name, as given to `inverse_dynamics`.
-        springs: as given to `inverse_dynamics`.
 
     The armature of a joint is inertia that its motor feels: it counts in torque and `rotor_energy` and carries no
     momentum. A geared rotor that shall count in the shaking moment is modelled as a body.
@@ -52,7 +51,6 @@ class Loads(Immutable):
     trajectory: Trajectory
     tree_torque: Array = field(repr=False)
     external: Mapping[str, Array] = field(default_factory=dict, repr=False)
-    springs: tuple[Spring | JointSpring, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         names = ("torque", "shaking_force", "shaking_moment", *(("frame_force", "frame_moment") if self.loaded else ()))
@@ -75,7 +73,7 @@ class Loads(Immutable):
     @cached_property
     def reactions(self) -> Reactions:
         """Closure forces and joint reactions; components that the model leaves open are nan."""
-        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external, self.springs)
+        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external)
 
     def torque_of(self, joint: str) -> Array:
         """Return the torque of one actuated joint (n,) [N m or N].
@@ -109,6 +107,18 @@ class Loads(Immutable):
     def closure_reactions_local(self) -> Array:
         """The same in the axes of the closure's frame 1 (n, closures, 6) [N, N m]."""
         return self.reactions.closure_local
+
+    @cached_property
+    def multipliers(self) -> Mapping[str, Array]:
+        """Forces in the rows of every closure by its name (n, rows); nan where redundant rows leave them open.
+
+        Of a coupling sum_k c_k q_k = offset it is what is transmitted: it acts with the torque c_k lambda in joint k
+        [N m or N, divided by the unit of c_k]. Of a distance it is the force that stretches the rod [N].
+        """
+        r = self.reactions
+        values = np.where(r.determinate_rows, r.multipliers, np.nan)
+        found = {c.closure.name: frozen(values[:, c.rows]) for c in loops_of(self.chain).anchored}
+        return MappingProxyType(found)
 
     @cached_property
     def bearing_force(self) -> Array:
@@ -146,7 +156,7 @@ class Loads(Immutable):
     @cached_property
     def _sprung(self) -> SpringForces:
         loops, q = loops_of(self.chain), self.trajectory.q
-        return spring_forces(self.chain, loops, self.springs, q, self.trajectory.v, loops.tree.poses(q))
+        return spring_forces(self.chain, loops, q, self.trajectory.v, loops.tree.poses(q))
 
     @cached_property
     def _bodies(self) -> BodyRates:
@@ -198,7 +208,7 @@ class Loads(Immutable):
         linear, angular = speeds(tree, path.q, moving.centre, path.N)  # (n, nb, na)
         work = np.sum((force + weight)[..., None] * linear + moment[..., None] * angular, axis=1)
         other = np.abs(np.array(chain.model.armature) * path.a) + np.abs(friction_torque(chain, path.v))
-        other = other + np.abs(self._sprung.force) + np.abs(acting.torques(tree, poses)).sum(axis=0)
+        other = other + self._sprung.size + np.abs(acting.torques(tree, poses)).sum(axis=0)
         shaking, about = force.sum(axis=1), np.sum(moment + arm * force, axis=1)
         return {
             "torque": (work + np.einsum("nvk,nv->nk", np.abs(path.N), other)).max(axis=1, initial=0.0),

@@ -6,17 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, cross, finite, frozen
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures import closure as rows
 from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_wrenches
 from fivebar_pin.dynamics.elastic import body_wrenches
 from fivebar_pin.dynamics.wrenches import moved_to_origin
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.mechanism.tree import Poses
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Reactions", "determinate", "reactions"]
@@ -31,6 +30,7 @@ class Reactions(Immutable):
 
     Attributes:
         multipliers: closure forces in the rows of J (n, m); of least norm where the closures are redundant.
+        determinate_rows: which of them are determinate (n, m).
         closure: wrench by body 1 on body 2 at the closure point (n, closures, 6) [N, N m].
         joint: wrench by the parent on the body of every joint, motor and joint springs included, at the joint origin
             (n, nb, 6).
@@ -49,6 +49,7 @@ class Reactions(Immutable):
     """
 
     multipliers: Array
+    determinate_rows: npt.NDArray[np.bool_]
     closure: Array
     joint: Array
     closure_local: Array
@@ -69,7 +70,6 @@ def reactions(
     tree_torque: Array,
     torque: Array,
     external: Mapping[str, Array],
-    springs: tuple[Spring | JointSpring, ...],
 ) -> Reactions:
     """Compute all reactions; see `Reactions`."""
     loops = loops_of(chain)
@@ -80,7 +80,7 @@ def reactions(
     moving = body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
     applied = moved_to_origin(chain, poses, external).on_bodies(moving.rate.shape[1])
-    sprung = body_wrenches(chain, loops, springs, trajectory.v, poses)
+    sprung = body_wrenches(chain, loops, trajectory.v, poses)
     unbalanced = np.array(tree_torque)
     unbalanced[:, loops.actuated] -= torque
     forces = _closure_forces(loops, poses, unbalanced)
@@ -91,6 +91,7 @@ def reactions(
     joint = _seen(carried, slack, np.stack(poses.p[1:], axis=1), np.stack(poses.R[1:], axis=1), unit)
     return Reactions(
         forces.multipliers,
+        forces.determinate_rows,
         closure[0],
         joint[0],
         closure[1],
@@ -108,6 +109,7 @@ def reactions(
 @dataclass(frozen=True, slots=True, eq=False)
 class _ClosureForces:
     multipliers: Array  # (n, m)
+    determinate_rows: npt.NDArray[np.bool_]  # (n, m)
     wrench: Array  # on body 2, at the world origin (n, nc, 6)
     free: Array  # what redundant closures could carry besides, for a basis of unit forces (n, k, nc, 6)
     point: Array  # of the closures (n, nc, 3)
@@ -121,24 +123,30 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     if not loops.m:
         none = np.zeros((n, 0, 6))
         mismatch = float(np.abs(unbalanced).max(initial=0.0))
-        return _ClosureForces(np.zeros((n, 0)), none, none[:, None], none[..., :3], np.zeros((n, 0, 3, 3)), mismatch)
+        axes, rows = np.zeros((n, 0, 3, 3)), np.zeros((n, 0), dtype=np.bool_)
+        return _ClosureForces(np.zeros((n, 0)), rows, none, none[:, None], none[..., :3], axes, mismatch)
     pairs = loops.pairs(poses)
     J = loops.jacobian(poses, pairs)
     decomposed = Decomposed.of(loops.scaled(J))
     rank = decomposed.rank
     multipliers = decomposed.carry(unbalanced * loops.column_scale, rank) * loops.row_scale
-    null = decomposed.left_null(rank) * loops.row_scale * loops.length  # (n, k, m)
+    free_rows = decomposed.left_null(rank)
+    determinate_rows = np.linalg.norm(free_rows, axis=1) <= _OPEN
+    determinate_rows.setflags(write=False)
+    null = free_rows * loops.row_scale * loops.length  # (n, k, m)
     wrench, free = [], []
     for anchored, pair in zip(loops.anchored, pairs, strict=True):
-        T = rows.selector(anchored.closure, pair)
+        T = anchored.selector(pair)
         wrench.append(np.einsum("nmi,nm->ni", T, multipliers[:, anchored.rows]))
         free.append(np.einsum("nmi,nkm->nki", T, null[:, :, anchored.rows]))
+    places = [anchored.place(pair) for anchored, pair in zip(loops.anchored, pairs, strict=True)]
     return _ClosureForces(
         frozen(multipliers),
+        determinate_rows,
         np.stack(wrench, axis=1),
         np.stack(free, axis=2),
-        np.stack([pair.p2 for pair in pairs], axis=1),
-        np.stack([pair.R1 for pair in pairs], axis=1),
+        np.stack([point for point, _ in places], axis=1),
+        np.stack([axes for _, axes in places], axis=1),
         float(np.abs(unbalanced - np.einsum("nmk,nm->nk", J, multipliers)).max(initial=0.0)),
     )
 

@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import checked
 from fivebar_pin._files import MAX_BYTES, as_path
-from fivebar_pin.chain import ClosedChain, Visual, frames_by_name
+from fivebar_pin.chain import ClosedChain, Geometry, Visual, frames_by_name
+from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
@@ -18,6 +19,7 @@ from fivebar_pin.io._entries import TreeEntry
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
 from fivebar_pin.io._urdf import read_urdf
+from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["load"]
 
@@ -52,7 +54,7 @@ def load(
             has this name.
     """
     where = _named(as_path(path))
-    file = _mechanism_file(where)
+    file = mechanism_file(where)
     given_closures = None if closures is None else _closures(closures)
     given_actuated = None if actuated is None else _names(actuated)
     if file.suffix.lower() == ".xml":
@@ -96,7 +98,7 @@ def _named(path: Path) -> Path:
     return shipped_path(path.name)
 
 
-def _mechanism_file(path: Path) -> Path:
+def mechanism_file(path: Path) -> Path:
     """Return the URDF or MJCF file that `path` means."""
     try:
         is_folder, exists = path.is_dir(), path.exists()
@@ -126,7 +128,8 @@ def _in_folder(folder: Path, endings: tuple[str, ...]) -> list[Path]:
         raise FileFormatError(folder, f"cannot be listed ({error.strerror or error})") from error
 
 
-def _sidecar_file(urdf: Path) -> Path | None:
+def sidecar_file(urdf: Path) -> Path | None:
+    """Return the sidecar that is read with a URDF: of the same name, or the only one of a folder with one URDF."""
     beside = _in_folder(urdf.parent, (".yaml", ".yml"))
     same = [f for f in beside if f.stem == urdf.stem]
     if len(same) > 1:
@@ -145,7 +148,7 @@ def _load_urdf(
     max_bytes: int,
 ) -> ClosedChain:
     tree = read_urdf(urdf, max_bytes=max_bytes)
-    beside = _sidecar_file(urdf)
+    beside = sidecar_file(urdf)
     if beside is None and (closures is None or actuated is None):
         raise FileFormatError(
             urdf,
@@ -159,6 +162,7 @@ def _load_urdf(
         check_closures(model, sidecar.closures, note, "closed_loop")
     if actuated is None:
         check_actuated(model, tree, sidecar, note)
+    check_springs(model, sidecar.springs, note)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     return make_chain(
         model,
@@ -167,6 +171,8 @@ def _load_urdf(
         visuals,
         urdf,
         argument=closures is not None or actuated is not None,
+        springs=sidecar.springs,
+        geometry=sidecar.geometry,
     )
 
 
@@ -178,10 +184,13 @@ def make_chain(
     file: Path,
     *,
     argument: bool,
+    springs: tuple[Spring | JointSpring, ...] = (),
+    geometry: Geometry | None = None,
 ) -> ClosedChain:
     """Return the chain; what is wrong with the file's own content is told as an error of the file."""
+    named = Geometry() if geometry is None else geometry
     try:
-        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals)
+        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, springs=springs, geometry=named)
     except FileFormatError:
         raise
     except FiveBarPinError as error:
@@ -191,22 +200,20 @@ def make_chain(
 
 
 def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
-    """Refuse closure frames that do not exist, are ambiguous (a link's name never is), or lie on one body."""
+    """Refuse closures that do not fit the model, or name frames that are ambiguous (a link's name never is)."""
     frames: dict[str, list[pin.Frame]] = {}
     named = frames_by_name(model) if closures else {}
     for frame in model.frames:
         frames.setdefault(frame.name, []).append(frame)
     for k, closure in enumerate(closures):
-        for name in closure.frames:
-            if name not in frames:
-                raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, frames)}")
+        try:
+            closure.check(model, named)
+        except FiveBarPinError as error:
+            raise FileFormatError(file, f"{key}[{k}]: {error}") from error
+        for name in closure.ends:
             same = [f for f in frames[name] if f.type not in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)]
             if len(same) > 1:
                 raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
-        joints = [named[name].parentJoint for name in closure.frames]
-        if joints[0] == joints[1]:
-            body = model.names[joints[0]]
-            raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")
 
 
 def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Path) -> None:
@@ -224,3 +231,12 @@ def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Pa
             raise FileFormatError(file, f"name_mot: {name!r} is not a joint that moves ({how}); it cannot be driven")
         else:
             raise FileFormatError(file, "name_mot: " + str(UnknownNameError("joint", name, joints)))
+
+
+def check_springs(model: pin.Model, springs: tuple[Spring | JointSpring, ...], file: Path) -> None:
+    """Refuse springs on frames or joints that do not exist, or that a chain cannot have."""
+    for k, spring in enumerate(springs):
+        try:
+            checked_springs(model, (spring,))
+        except FiveBarPinError as error:
+            raise FileFormatError(file, f"springs[{k}]: {error}") from error

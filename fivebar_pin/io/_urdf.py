@@ -14,7 +14,7 @@ from fivebar_pin.chain import Visual
 from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import bare_inertia
 from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
-from fivebar_pin.io._xml import Reader, parse_xml
+from fivebar_pin.io._xml import UNIT, Reader, direction, parse_xml
 
 __all__ = ["read_urdf"]
 
@@ -160,12 +160,13 @@ def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -
     axis = np.array(reader.numbers(stated, "xyz", 3, where, [1.0, 0.0, 0.0]))
     if kind in ("fixed", "floating"):
         return axis
-    length = float(np.linalg.norm(axis))
-    if not 1e-9 < length < 1e9:
-        raise reader.fail(where, f"axis {axis.tolist()} has no direction")
-    if kind == "planar" and not np.array_equal(axis / length, [0.0, 0.0, 1.0]):
+    try:
+        unit = direction(axis)
+    except ValueError:
+        raise reader.fail(where, f"axis {axis.tolist()} has no direction") from None
+    if kind == "planar" and not np.allclose(unit, [0.0, 0.0, 1.0], rtol=0.0, atol=UNIT):
         raise reader.fail(where, "a planar joint must have the axis 0 0 1; turn its <origin> instead")
-    return axis if abs(length - 1.0) < 4e-16 else axis / length
+    return unit
 
 
 def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> dict[str, list[float]]:

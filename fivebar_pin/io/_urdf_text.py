@@ -72,6 +72,8 @@ def _sidecar(chain: ClosedChain, tree: TreeEntry) -> Sidecar:
         joint_order=None if usual == list(chain.joints) else chain.joints,
         joint_data=data,
         configurations={name: [float(x) for x in q] for name, q in configurations(model)},
+        springs=chain.springs,
+        geometry=chain.geometry,
     )
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fivebar_pin._arrays import Array, lazy
-from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.passive import PassiveMap
 from fivebar_pin.mechanism.rank import Decomposed, Factored, factored
@@ -34,7 +34,7 @@ class Configurations:
         return self.loops.tree.poses(self.q)
 
     @lazy
-    def pairs(self) -> list[FramePair]:
+    def pairs(self) -> list[Any]:
         """World poses of the frames of every closure."""
         return self.loops.pairs(self.poses)
 

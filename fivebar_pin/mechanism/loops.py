@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +11,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
-from fivebar_pin.closures import Closure
-from fivebar_pin.closures import closure as rows
-from fivebar_pin.closures.closure import FramePair
+from fivebar_pin.closures import Anchored
 from fivebar_pin.errors import AssemblyError, InvalidInputError
 from fivebar_pin.mechanism.passive import Group, PassiveMap, passive_map
 from fivebar_pin.mechanism.per_chain import once_per_chain
@@ -26,20 +24,6 @@ __all__ = ["Loops", "loops_of", "open_message"]
 _Index = npt.NDArray[np.intp] | slice
 
 _GENERIC_SAMPLES = 12
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Anchored:
-    """A closure with its frames resolved to joints."""
-
-    index: int
-    closure: Closure
-    joints: tuple[int, int]
-    R: tuple[Array, Array]
-    p: tuple[Array, Array]
-    sign: Array  # (nv,): +1 moves only body 2, -1 only body 1, 0 both or neither
-    moved: npt.NDArray[np.intp]  # columns with a sign
-    rows: slice
 
 
 class Loops:
@@ -60,30 +44,14 @@ class Loops:
         self.closures = chain.closures
         self.actuated, self.passive = chain.actuated_index, chain.passive_index
         self.length = chain.length
-        self.anchored: list[_Anchored] = []
-        start, named = 0, frames_by_name(model) if chain.closures else {}
+        self.anchored: list[Anchored] = []
+        frames, self.m = frames_by_name(model) if chain.closures else {}, 0
         for closure in chain.closures:
-            frames = [named[f] for f in closure.frames]
-            i, j = (int(f.parentJoint) for f in frames)
-            sign = self.tree.support[j].astype(float) - self.tree.support[i].astype(float)
-            self.anchored.append(
-                _Anchored(
-                    len(self.anchored),
-                    closure,
-                    (i, j),
-                    (np.array(frames[0].placement.rotation), np.array(frames[1].placement.rotation)),
-                    (np.array(frames[0].placement.translation), np.array(frames[1].placement.translation)),
-                    sign,
-                    np.flatnonzero(sign),
-                    slice(start, start + closure.kind.rows),
-                )
-            )
-            start += closure.kind.rows
-        self.m = start
-        self.row_scale = np.concatenate(
-            [np.r_[np.full(3, 1.0 / self.length), np.ones(c.kind.rows - 3)] for c in chain.closures] or [np.zeros(0)]
-        )
+            self.anchored.append(closure.anchor(model, frames, self.tree.support, self.m))
+            self.m = self.anchored[-1].rows.stop
         self.column_scale = np.array([1.0 if self.tree.is_angle(k) else self.length for k in range(self.tree.nv)])
+        scales = [c.row_scale(self.length, self.column_scale) for c in self.anchored]
+        self.row_scale = np.concatenate(scales or [np.zeros(0)])
         self._groups = [self._group(members) for members in self._members()]
         self.reduce = np.zeros((sum(g.reduce.shape[0] for g in self._groups), self.m))
         done = 0
@@ -119,26 +87,15 @@ class Loops:
         for column, k in enumerate(self.actuated):
             self.tree.set_coordinate(q, int(k), np.broadcast_to(x[..., column], q.shape[:1]))
 
-    def pairs(self, poses: Poses) -> list[FramePair]:
-        """Return the world poses of the frames of every closure."""
-        out = []
-        for c in self.anchored:
-            (i, j), (Ri, Rj), (pi, pj) = c.joints, c.R, c.p
-            out.append(
-                FramePair(
-                    np.matmul(poses.R[i], Ri),
-                    poses.p[i] + np.matmul(poses.R[i], pi),
-                    np.matmul(poses.R[j], Rj),
-                    poses.p[j] + np.matmul(poses.R[j], pj),
-                )
-            )
-        return out
+    def pairs(self, poses: Poses) -> list[Any]:
+        """Return what every closure sees of the configurations: the world poses of its frames, or its coordinates."""
+        return [c.look(poses) for c in self.anchored]
 
-    def residual(self, pairs: list[FramePair]) -> Array:
+    def residual(self, pairs: list[Any]) -> Array:
         """Return all closure rows (n, m) [m, rad]; the chain has closures."""
-        return np.concatenate([rows.residual(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
+        return np.concatenate([c.residual(x) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
 
-    def jacobian(self, poses: Poses, pairs: list[FramePair]) -> Array:
+    def jacobian(self, poses: Poses, pairs: list[Any]) -> Array:
         """Return the closure Jacobian J (n, m, nv): residual rate = J v."""
         return self.joined(self.blocks(poses, pairs), poses.S.shape[0])
 
@@ -149,32 +106,27 @@ class Loops:
             J[:, g.rows[:, None], g.columns] = block
         return J
 
-    def blocks(self, poses: Poses, pairs: list[FramePair]) -> list[Array]:
+    def blocks(self, poses: Poses, pairs: list[Any]) -> list[Array]:
         """Return the same per independent group of closures, without the zeros."""
-        out = []
-        for g in self._groups:
-            block = np.zeros((poses.S.shape[0], g.rows.size, g.columns.size))
-            start = 0
-            for c in (self.anchored[k] for k in g.members):
-                m = c.closure.kind.rows
-                block[:, start : start + m, np.searchsorted(g.columns, c.moved)] = _rows(c, poses, pairs)
-                start += m
-            out.append(block)
-        return out
+        return [self._block(g.members, g.columns, poses, pairs) for g in self._groups]
 
-    def drift(self, pairs: list[FramePair], rates: Rates) -> Array:
+    def _block(self, members: tuple[int, ...], columns: npt.NDArray[np.intp], poses: Poses, pairs: list[Any]) -> Array:
+        """Return the rows of some closures in some columns (n, rows, columns)."""
+        closures = [self.anchored[k] for k in members]
+        sizes = [c.rows.stop - c.rows.start for c in closures]
+        block, start = np.zeros((poses.S.shape[0], sum(sizes), columns.size)), 0
+        for k, c, size in zip(members, closures, sizes, strict=True):
+            block[:, start : start + size, np.searchsorted(columns, c.columns)] = c.jacobian(pairs[k], poses)
+            start += size
+        return block
+
+    def drift(self, pairs: list[Any], rates: Rates) -> Array:
         """Return the second rate of the residual at zero joint accelerations (n, m)."""
-        return np.concatenate(
-            [
-                rows.drift(c.closure, x, *(rates.V[j] for j in c.joints), *(rates.A[j] for j in c.joints))
-                for c, x in zip(self.anchored, pairs, strict=True)
-            ],
-            axis=1,
-        )
+        return np.concatenate([c.drift(x, rates) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
 
-    def opposed(self, pairs: list[FramePair]) -> npt.NDArray[np.bool_]:
+    def opposed(self, pairs: list[Any]) -> npt.NDArray[np.bool_]:
         """Return where some hinge closes with its axes against each other (n,)."""
-        flags = [rows.opposed(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)]
+        flags = [c.opposed(x) for c, x in zip(self.anchored, pairs, strict=True)]
         return np.asarray(np.any(flags, axis=0))
 
     def passive_map(self, blocks: list[Array], n: int) -> PassiveMap:
@@ -213,8 +165,8 @@ class Loops:
         """Gather closures that share a passive joint."""
         groups: list[tuple[set[int], list[int]]] = []
         passive = set(self.passive.tolist())
-        for c in self.anchored:
-            columns, members = set(c.moved.tolist()) & passive, [c.index]
+        for k, c in enumerate(self.anchored):
+            columns, members = set(c.columns.tolist()) & passive, [k]
             apart = []
             for other_columns, other_members in groups:
                 if columns & other_columns:
@@ -227,7 +179,7 @@ class Loops:
     def _group(self, members: tuple[int, ...]) -> Group:
         closures = [self.anchored[k] for k in members]
         rows_ = np.concatenate([np.arange(c.rows.start, c.rows.stop) for c in closures])
-        columns = np.unique(np.concatenate([c.moved for c in closures]))
+        columns = np.unique(np.concatenate([c.columns for c in closures]))
         passive = np.flatnonzero(np.isin(self.passive, columns))
         actuated = np.flatnonzero(np.isin(self.actuated, columns))
         return Group(
@@ -238,21 +190,16 @@ class Loops:
             passive_columns=np.searchsorted(columns, self.passive[passive]),
             actuated=actuated,
             actuated_columns=np.searchsorted(columns, self.actuated[actuated]),
-            reduce=self._independent_rows(closures, rows_, columns),
+            reduce=self._independent_rows(members, rows_, columns),
             scale=self.column_scale[self.passive[passive]],
         )
 
     def _independent_rows(
-        self, closures: list[_Anchored], rows_: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
+        self, members: tuple[int, ...], rows_: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
     ) -> Array:
         """Find the row combinations of some closures that are independent at generic configurations."""
         poses, pairs = self._generic
-        J = np.zeros((_GENERIC_SAMPLES, rows_.size, columns.size))
-        start = 0
-        for c in closures:
-            m = c.closure.kind.rows
-            J[:, start : start + m, np.searchsorted(columns, c.moved)] = _rows(c, poses, pairs)
-            start += m
+        J = self._block(members, columns, poses, pairs)
         scale = self.row_scale[rows_]
         wide = np.concatenate(list(self.scaled(J, rows_, columns)), axis=1)
         U, s, _ = np.linalg.svd(wide, full_matrices=False)
@@ -260,7 +207,7 @@ class Loops:
         return np.diag(scale) if r == rows_.size else np.asarray(U[:, :r].T * scale)
 
     @cached_property
-    def _generic(self) -> tuple[Poses, list[FramePair]]:
+    def _generic(self) -> tuple[Poses, list[Any]]:
         rng = np.random.default_rng(7)
         tangent = rng.uniform(-np.pi, np.pi, (_GENERIC_SAMPLES, self.tree.nv)) * self.column_scale
         q = self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent)
@@ -272,11 +219,6 @@ class Loops:
 def loops_of(chain: ClosedChain) -> Loops:
     """Return the prepared closures of a chain, made once."""
     return Loops(chain)
-
-
-def _rows(c: _Anchored, poses: Poses, pairs: list[FramePair]) -> Array:
-    """Return the Jacobian of one closure in the columns that move it (n, rows, moved)."""
-    return np.asarray(np.matmul(rows.selector(c.closure, pairs[c.index]), poses.S[:, :, c.moved] * c.sign[c.moved]))
 
 
 def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:

@@ -55,11 +55,13 @@ class Poses:
         R: per joint (n, 3, 3), index 0 is the universe.
         p: per joint (n, 3) [m].
         S: motion subspace of every velocity coordinate, world axes at the world origin (n, 6, nv).
+        q: the configurations (n, nq).
     """
 
     R: list[Array]
     p: list[Array]
     S: Array
+    q: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +107,7 @@ class Tree:
         for joint in self.joints[1:]:
             assert joint is not None
             _advance(joint, q, R, p, S)
-        return Poses(R, p, S)
+        return Poses(R, p, S, q)
 
     @property
     def _data(self) -> Any:
@@ -124,7 +126,7 @@ class Tree:
             S[i] = pin.computeJointJacobians(self._model, data, q[i]).reshape(6, self.nv)
             for j, M in enumerate(data.oMi):
                 R[j][i], p[j][i] = M.rotation, M.translation
-        return Poses(R, p, S)
+        return Poses(R, p, S, q)
 
     def coordinate(self, q: Array, k: int) -> Array:
         """Return the coordinate that belongs to velocity index k of a one-degree-of-freedom joint.  (n, nq) -> (n,)."""

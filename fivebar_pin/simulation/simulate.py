@@ -7,7 +7,7 @@ stabilise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -22,7 +22,6 @@ from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.simulation.chart_motion import ClosedState, Inputs
 from fivebar_pin.simulation.integrator import run
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Torque", "simulate"]
@@ -39,7 +38,6 @@ def simulate(
     tau: Torque = None,
     t: npt.ArrayLike | None = None,
     *,
-    springs: Iterable[Spring | JointSpring] = (),
     external: Mapping[str, Wrench] | None = None,
     initial: Literal["check", "project"] = "check",
     rtol: float = 1e-11,
@@ -59,7 +57,6 @@ def simulate(
         tau: torque of the actuated joints: constant (na,), one number where there is one motor, or a function
             (t, q, v) of either [N m or N]; no torque unless given.
         t: increasing output times (n,) [s]; always needed.
-        springs: springs and dampers.
         external: forces from outside: frame name -> wrench (6,) or a function (t, q, v) -> (6,), force [N] and moment
             [N m] in world axes at the frame's origin.
         initial: "check" refuses a state that does not keep the loops closed; "project" moves it to a near one that
@@ -90,7 +87,7 @@ def simulate(
     integer("max_steps", max_steps, least=1)
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
-    system = EquationsOfMotion.of(chain, tuple(springs))
+    system = EquationsOfMotion.of(chain)
     require_frames(chain, external or {})
     state = _initial_state(system, checked("q", q, (chain.nq,)), checked("v", v, (chain.nv,)), initial)
     inputs = Inputs(tau if callable(tau) else constant_torque(chain, tau), dict(external or {}))

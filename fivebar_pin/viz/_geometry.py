@@ -16,12 +16,16 @@ from fivebar_pin.chain import find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.plane import plane_normal
+from fivebar_pin.springs import Spring
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain
     from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]
+__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes", "spring_ends"]
+
+_SAME = 1e-9  # distance of points that are one [of the body, and for its size at least so many m]
+_ALONG = 1e-9  # component that counts as none [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,13 +122,13 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
     """Return the points (k, 3) [m] that the body of a joint connects, in its own frame, its own joint first.
 
     These are the joints it carries and its closure frames; for the last body of a branch the farthest frame
-    on it, or its mass centre when there is none.
+    on it, or its mass centre when there is none. The ends of springs on it come last.
     """
     model = chain.model
     points = [np.zeros(3)]
     points += [np.array(model.jointPlacements[k].translation) for k in model.children[joint]]
     for closure in chain.closures:
-        for name in closure.frames:
+        for name in closure.ends:
             frame = find_frame(model, name)
             if frame.parentJoint == joint:
                 points.append(np.array(frame.placement.translation))
@@ -133,13 +137,23 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
         ends.append(np.array(model.inertias[joint].lever))
         tip = max(ends, key=lambda p: float(np.linalg.norm(p)))
         points.append(tip)
+    held = [f for s in chain.springs if isinstance(s, Spring) for f in (s.frame1, s.frame2)]
+    frames = [find_frame(model, name) for name in held]
+    points += [np.array(f.placement.translation) for f in frames if f.parentJoint == joint]
     return _distinct(np.array(points))
+
+
+def spring_ends(chain: ClosedChain, spring: Spring, joints: Array) -> tuple[Array, Array]:
+    """Return where the ends of a spring are (n, 3) each [m], from the poses of the joint frames (n, njoints, 4, 4)."""
+    frames = (find_frame(chain.model, name) for name in (spring.frame1, spring.frame2))
+    first, second = (joints[:, f.parentJoint] @ f.placement.homogeneous for f in frames)
+    return first[:, :3, 3], second[:, :3, 3]
 
 
 def _distinct(points: Array) -> Array:
     """Return the points without repetitions, in their order."""
     kept: list[Array] = []
-    tolerance = 1e-9 * max(float(np.max(np.abs(points))), 1e-9)
+    tolerance = _SAME * max(float(np.max(np.abs(points))), _SAME)
     for point in points:
         if all(float(np.linalg.norm(point - other)) > tolerance for other in kept):
             kept.append(point)
@@ -163,5 +177,5 @@ def find_view(chain: ClosedChain, q: Array) -> View:
     up /= np.linalg.norm(up)
     right = np.cross(up, normal)
     # Of the two sides of the plane, look from the one that has x (else y) to the right.
-    facing = right[0] if abs(right[0]) > 1e-9 else right[1]
+    facing = right[0] if abs(right[0]) > _ALONG else right[1]
     return View(right * np.sign(facing or 1.0), up, planar=True)

@@ -7,7 +7,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.balancing import Ball, balance, balance_conditions, pareto
-from fivebar_pin.balancing._sampling import random_samples
+from fivebar_pin.balancing.sampling import random_samples
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.io import shipped, shipped_path
 from fivebar_pin.shipped import mechanisms

@@ -8,8 +8,10 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin import paper
+from fivebar_pin.balancing import conditions
 from fivebar_pin.balancing.conditions import balance_conditions
 from fivebar_pin.dynamics import inverse_dynamics
+from fivebar_pin.errors import SolverError
 from fivebar_pin.paper import table_1
 
 
@@ -165,3 +167,26 @@ def test_bad_requests_are_refused_with_what_is_known() -> None:
         balance_conditions(chain, "static", gravity=(0.0, 0.0, 0.0))
     with pytest.raises(fb.errors.InvalidInputError, match="samples"):
         balance_conditions(chain, "force", samples=3)
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "rank"),
+    [
+        ((1.0, 1e-1, 1e-5, 1e-8, 1e-12, 1e-15), 4),  # the widest gap
+        ((1.0, 1e-5, 1e-9, 1e-12, 1e-15), 2),  # a gap above a millionth is none, however wide
+        ((1.0, 2e-3, 4e-6, 8e-9, 1.6e-11, 3.2e-14, 6.4e-17), None),  # 500 to one everywhere: no decision
+        ((1.0, 5e-4, 2e-7, 1e-10, 5e-14, 2.5e-17), 2),  # 2500 to one once
+    ],
+)
+def test_a_rank_is_where_the_spectrum_has_a_clear_gap(
+    spectrum: tuple[float, ...], rank: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What counts as a condition is decided by a gap of a thousand that begins below a millionth, or not at all."""
+    rows = np.zeros((20, 12))
+    rows[range(len(spectrum)), range(len(spectrum))] = spectrum
+    monkeypatch.setattr(conditions, "_rows", lambda *_: rows)
+    if rank is None:
+        with pytest.raises(SolverError, match=r"show no clear gap \(best ratio 500 after"):
+            balance_conditions(mechanisms.four_bar(), "force")
+    else:
+        assert balance_conditions(mechanisms.four_bar(), "force").rank == rank

@@ -25,7 +25,7 @@ from fivebar_pin.balancing import (
     balance_problem,
     realise,
 )
-from fivebar_pin.balancing._parameters import pseudo_inertia
+from fivebar_pin.balancing.parameters import pseudo_inertia
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, UnknownNameError
 

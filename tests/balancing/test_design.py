@@ -12,7 +12,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin import paper
 from fivebar_pin.balancing import Ball, Box, Design, Ellipsoid, balance, balance_conditions, balance_problem
-from fivebar_pin.balancing._parameters import pseudo_inertia
+from fivebar_pin.balancing.parameters import pseudo_inertia
 from fivebar_pin.balancing.solvers import solve
 from fivebar_pin.balancing.solvers.certificate import polished
 from fivebar_pin.dynamics import inverse_dynamics
@@ -422,3 +422,52 @@ def test_a_solver_that_is_not_installed_names_its_package(monkeypatch: pytest.Mo
 def test_regions_beyond_what_can_be_told_from_round_off_are_refused(region: Ball | Box) -> None:
     with pytest.raises(InvalidInputError, match=r"region of body .* must lie within 60000 m"):
         balance(case_I()[0], "force", region=region)
+
+
+def test_no_body_loses_more_than_half_of_its_mass() -> None:
+    """Drilling both distal links evenly makes everything lighter without end: the bound is what stops it."""
+    chain, _ = case_I()
+    bodies = ["theta_psi", "phi_gamma"]
+    design = balance(chain, "force", region=Ball(REACH), remove=bodies)
+    taken = {c.body: c.mass for c in design.removed}
+    for body in bodies:
+        whole = chain.inertial_parameters[chain.joints.index(body), 0]
+        assert taken[body] == pytest.approx(0.5 * whole, rel=1e-6)
+
+
+def gimbal(side: tuple[float, float]) -> fb.ClosedChain:
+    """Return a body of 1 kg on three crossing hinges; 1 kg at (0.5, 0, 0.5) times `side` balances its force."""
+    lever = -0.5 * np.array([side[0], 0.0, side[1]])
+    inertia = np.diag([3.0, 3.0, 3.0])
+    inertia[0, 2] = inertia[2, 0] = -0.5 * side[0] * side[1]
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    joint = 0
+    for name, kind in (("x", pin.JointModelRX), ("y", pin.JointModelRY), ("z", pin.JointModelRZ)):
+        own = pin.Inertia(1.0, lever, inertia) if name == "z" else pin.Inertia(1.0, np.zeros(3), np.eye(3))
+        joint = mechanisms.add(model, joint, kind(), mechanisms.at(), name, own)
+    return fb.ClosedChain(model, (), ("x", "y", "z"))
+
+
+@pytest.mark.parametrize("side", [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
+def test_material_in_a_box_lies_within_its_corners(side: tuple[float, float]) -> None:
+    """Spinning about z the body shakes by w^2 I_xz, 0.75 w^2 as it is.
+
+    Half-way to a corner of a box of half lengths one, the mean of (1 - x)(1 - z) >= 0 leaves the added kilogram no
+    product of inertia against it; extents along the edges alone would let it take 0.5 away.
+    """
+    chain = gimbal(side)
+    t = np.linspace(0.0, 1.0, 5)
+    spin = fb.Motion(t, np.outer(t, [0.0, 0.0, 2.0]), np.tile([0.0, 0.0, 2.0], (5, 1)), np.zeros((5, 3)))
+    design = balance(
+        chain,
+        "force",
+        minimise="rms_shaking_moment",
+        motions=spin,
+        bodies=["z"],
+        region=Box((2.0, 2.0, 2.0)),
+        masses=(0.0, 1.0),
+        material=None,
+    )
+    assert design.objective == pytest.approx(0.75 * 4.0, rel=1e-6)
+    assert design.residual < 1e-14

@@ -9,7 +9,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.balancing import Ball, balance, balance_conditions
-from fivebar_pin.balancing._sampling import random_samples
+from fivebar_pin.balancing.sampling import random_samples
 
 
 def serial(links: int) -> fb.ClosedChain:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fivebar_pin.balancing import balance_problem, realise
-from fivebar_pin.balancing._parameters import pseudo_inertia
+from fivebar_pin.balancing.parameters import pseudo_inertia
 
 COUNT = int(os.environ.get("FIVEBAR_PIN_RANDOM_PROBLEMS", "16"))
 SEED = int(os.environ.get("FIVEBAR_PIN_RANDOM_SEED", "7"))

@@ -15,9 +15,9 @@ import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
-from fivebar_pin.balancing import _sampling, balance, balance_conditions, balance_problem, conditions, pareto
-from fivebar_pin.balancing._sampling import random_samples
+from fivebar_pin.balancing import balance, balance_conditions, balance_problem, conditions, pareto, sampling
 from fivebar_pin.balancing.branches import branches
+from fivebar_pin.balancing.sampling import random_samples
 from fivebar_pin.cli import main
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SolverError
 from fivebar_pin.mechanism.per_chain import once_per_chain
@@ -140,7 +140,7 @@ def test_a_stewart_platform_moves_within_the_strokes_of_its_legs() -> None:
     low[rods], high[rods] = q[rods] - 0.01, q[rods] + 0.01
     chain = limited(plain, low, high)
     assert ranks(chain) == [28, 100]
-    assert _sampling._shelf_of(chain)._draws[b"", 0]._closed > 40  # of 98 starts
+    assert sampling._shelf_of(chain)._draws[b"", 0]._closed > 40  # of 98 starts
     x = random_samples(chain, 200).q[:, rods]
     assert (x >= low[rods]).all() and (x <= high[rods]).all()
 
@@ -157,7 +157,7 @@ def test_samples_reach_every_assembly_mode() -> None:
 
 @pytest.mark.parametrize("make", [families.six_bar, families.planar_rrr], ids=["six-bar", "14-RRR"])
 def test_one_reference_configuration_is_enough_to_walk_from(make: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_sampling, "_STARTS", 0)
+    monkeypatch.setattr(sampling, "_STARTS", 0)
     kind = {families.six_bar: "watt", families.planar_rrr: 14}[make]  # type: ignore[index]
     chain = make(kind, 5, home=True)  # type: ignore[operator]
     model = chain.model.copy()
@@ -166,7 +166,7 @@ def test_one_reference_configuration_is_enough_to_walk_from(make: object, monkey
         model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q] = at - 0.05, at + 0.05
     chain = fb.ClosedChain(model, chain.closures, chain.actuated)
     assert ranks(chain) == planar_rule(chain)
-    draw = _sampling._shelf_of(chain)._draws[b"", 0]
+    draw = sampling._shelf_of(chain)._draws[b"", 0]
     assert draw._tried == 2
 
 
@@ -271,7 +271,7 @@ class Counted:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.decided: Counter[tuple[object, ...]] = Counter()
         self.drawn: Counter[tuple[object, ...]] = Counter()
-        find, draw = conditions._conditions, _sampling._Draw.__init__
+        find, draw = conditions._conditions, sampling._Draw.__init__
 
         def decide(chain: fb.ClosedChain, kind: str, *rest: object) -> object:
             found = find(chain, kind, *rest)  # type: ignore[arg-type]
@@ -283,7 +283,7 @@ class Counted:
             draw(own, chain, near, seed)  # type: ignore[arg-type]
 
         monkeypatch.setattr(conditions, "_conditions", decide)
-        monkeypatch.setattr(_sampling._Draw, "__init__", drew)
+        monkeypatch.setattr(sampling._Draw, "__init__", drew)
 
     def once(self, decided: int, drawn: int) -> None:
         """Assert so many sets of arguments, each asked once."""
@@ -366,9 +366,9 @@ def test_what_is_made_twice_at_once_is_one_for_all() -> None:
 
 def test_draws_are_bounded_and_let_go_with_their_chain() -> None:
     chain = mechanisms.parallelogram()
-    for seed in range(_sampling._SHELF + 3):
+    for seed in range(sampling._SHELF + 3):
         random_samples(chain, 10, seed=seed)
-    assert len(_sampling._shelf_of(chain)._draws) == _sampling._SHELF
+    assert len(sampling._shelf_of(chain)._draws) == sampling._SHELF
     gone = weakref.ref(chain)
     balance_conditions(chain, "force", near=[1.0, -1.0, 1.0])
     del chain

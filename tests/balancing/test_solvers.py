@@ -14,7 +14,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.balancing import Ball, Box, Design, balance, balance_problem, pareto
-from fivebar_pin.balancing._parameters import pseudo_inertia
+from fivebar_pin.balancing.parameters import pseudo_inertia
 from fivebar_pin.balancing.solvers import SOLVERS, Block, Program, solve, solver_named
 from fivebar_pin.balancing.solvers import answer as answers
 from fivebar_pin.balancing.solvers import clarabel as clarabel_file
@@ -332,8 +332,8 @@ def test_bodies_left_empty_leave_the_program_without_a_trace() -> None:
 
 def test_masses_that_cancel_in_pairs_are_left_empty() -> None:
     """m(a) + m(b) = 0 and m(c) - m(d) = 0 empty the first two bodies alone; a bound above zero empties none."""
-    from fivebar_pin.balancing._empty import empty, without
-    from fivebar_pin.balancing._material import Bounds, material
+    from fivebar_pin.balancing.facial_reduction import empty, without
+    from fivebar_pin.balancing.variables.material import Bounds, material
 
     materials = [material(b, 1, 4 * b, f"{b}", Bounds(), planar=True) for b in range(4)]
     rows = np.zeros((2, 16))

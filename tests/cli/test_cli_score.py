@@ -9,7 +9,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.balancing import score, variations
-from fivebar_pin.balancing._parameters import pseudo_inertia
+from fivebar_pin.balancing.parameters import pseudo_inertia
 from fivebar_pin.cli import main
 
 

@@ -24,8 +24,8 @@ from mechanisms import (
 
 import fivebar_pin as fb
 from fivebar_pin.closures import ClosureKind
-from fivebar_pin.closures.closure import log3
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.closures.weld import log3
+from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import Loops, loops_of
 
 KINDS = ("3d", "6d", "revolute")
@@ -213,7 +213,9 @@ def test_closures_reject_what_they_cannot_be():
         fb.Closure(("a",))  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="must be two frame names"):
         fb.Closure("ab")  # type: ignore[arg-type]
-    with pytest.raises(UnknownNameError, match=r"Unknown closure kind '4d'; known: 3d, 6d, revolute"):
+    with pytest.raises(
+        UnknownNameError, match=r"Unknown closure kind '4d'; known: 3d, 6d, coupling, cylindrical, distance, revolute"
+    ):
         fb.Closure(("a", "b"), "4d")  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="must not be zero"):
         fb.Closure(("a", "b"), "revolute", (0.0, 0.0, 0.0))
@@ -228,3 +230,59 @@ def test_closures_accept_the_words_of_a_sidecar_in_any_case_and_normalise_the_ax
     assert closure.name == "a~b"
     np.testing.assert_allclose(closure.axis, [0.0, 0.6, 0.8], rtol=0.0, atol=1e-15)
     assert not closure.axis.flags.writeable  # type: ignore[union-attr]
+
+
+def hinged_arms(count: int) -> fb.ClosedChain:
+    """Return arms on the ground, each closed to it by a hinge that is met at 0 and, back to front, at half a turn."""
+    model = pin.Model()
+    closures = []
+    for k in range(count):
+        arm = add(model, 0, pin.JointModelRX(), at(float(k)), f"arm{k}", body())
+        names = (point(model, 0, f"ground{k}", at(float(k))), point(model, arm, f"moving{k}", at()))
+        closures.append(fb.Closure(names, "revolute", name=f"hinge{k}"))
+    return fb.ClosedChain(model, tuple(closures), ())
+
+
+@pytest.mark.parametrize("turned", [(), (0,), (1,), (0, 1)])
+def test_one_hinge_back_to_front_is_enough_whichever_it_is(turned):
+    chain = hinged_arms(2)
+    q = np.array([np.pi if k in turned else 0.0 for k in range(2)])
+    assert np.abs(fb.closure_residual(chain, q)).max() < 1e-15
+    said = any("back to front" in p.text for p in fb.diagnose(chain, q).problems)
+    assert said == bool(turned)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.4, 2.9, -2.9])
+def test_no_search_ends_with_a_hinge_back_to_front(start):
+    chain = hinged_arms(1)
+    try:
+        q = fb.assemble(chain, [], [start])
+    except AssemblyError:
+        assert abs(start) > 2.0, "the hinge closes near by"
+    else:
+        assert np.cos(q[0]) > 0.999
+    modes = fb.assembly_modes(chain, [])
+    np.testing.assert_allclose(np.cos(modes), [[1.0]], rtol=0.0, atol=1e-12)
+
+
+def test_a_diagnosis_looks_beyond_a_neutral_configuration_that_is_back_to_front():
+    """At zero the arm lies on its hinge the wrong way round; the right way is half a turn off."""
+    model = pin.Model()
+    arm = add(model, 0, pin.JointModelRX(), at(), "arm", body())
+    names = (point(model, 0, "ground", at()), point(model, arm, "moving", at(rpy=(np.pi, 0.0, 0.0))))
+    found = fb.diagnose(fb.ClosedChain(model, (fb.Closure(names, "revolute"),), ()))
+    assert not any("back to front" in p.text for p in found.problems)
+    np.testing.assert_allclose(np.cos(found.q), [-1.0], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [1e-5, 5e-4, 9e-4, 1.1e-3])
+def test_jacobian_of_a_weld_is_the_derivative_of_its_residual_where_it_is_nearly_closed(angle):
+    """The rotation rows are nearly linear there; what is left of the second order still counts."""
+    model = pin.Model()
+    arm = add(model, 0, pin.JointModelSpherical(), at(), "arm", body())
+    names = (point(model, 0, "ground", at(rpy=(0.3, -0.2, 0.5))), point(model, arm, "moving", at(rpy=(0.3, -0.2, 0.5))))
+    loops = loops_of(fb.ClosedChain(model, (fb.Closure(names, "6d"),), ()))
+    turn = angle * np.array([0.6, 0.0, 0.8])
+    q, v = pin.Quaternion(pin.exp3(turn)).coeffs()[None], np.array([[-0.7, 0.9, 0.4]])
+    rate = central(lambda h: residual(loops, loops.tree.integrate(q, h * v)), h=1e-4)
+    np.testing.assert_allclose(jacobian(loops, q)[0] @ v[0], rate[0], rtol=0.0, atol=3e-11)

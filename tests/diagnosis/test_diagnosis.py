@@ -454,3 +454,13 @@ def test_blocks_decompose_as_the_whole_does(shape: tuple[int, int]) -> None:
     np.testing.assert_allclose(U @ U.T, np.eye(shape[0]), rtol=0, atol=1e-13)
     np.testing.assert_allclose(Vt @ Vt.T, np.eye(shape[1]), rtol=0, atol=1e-13)
     np.testing.assert_allclose((U[:, : s.size] * s) @ Vt[: s.size], A, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("away", [1e-3, 1e-6, 1e-8])
+def test_next_to_a_singular_configuration_the_rank_is_whole(away):
+    """The flat parallelogram has lost a row; whatever lies beside it has not."""
+    chain = parallelogram()
+    beside, flat = (diagnose(chain, [x, -x, x]) for x in (away, 0.0))
+    assert (beside.rank, beside.mobility, beside.is_singular) == (2, 1, False)
+    assert 0.1 * away < beside.singular_values[1] < 10.0 * away
+    assert (flat.rank, flat.mobility, flat.is_singular) == (1, 2, True)

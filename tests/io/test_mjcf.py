@@ -169,14 +169,15 @@ def test_a_free_joint_and_its_keyframe_come_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("<option", "<tendon><spatial/></tendon><option", "tendons are not supported"),
+        ("<option", '<tendon><fixed stiffness="3"/></tendon><option', "stiffness of a tendon is not supported"),
         (
             '<connect name="pin"',
-            '<joint joint1="ja" joint2="jb"/><connect name="pin"',
-            "couples the coordinates of joints, not two frames; only connect and weld",
+            '<joint joint1="ja" joint2="jb" polycoef="0 1 0.5 0 0"/><connect name="pin"',
+            "is not linear; only a0 + a1 x is supported",
         ),
         ("<option", '<include file="other.xml"/><option', "merge them"),
-        ('name="jb"', 'name="jb" stiffness="3"', "stiffness is not supported"),
+        ('name="jc"', 'name="jc" stiffness="3"', "stiffness of a ball joint is not supported"),
+        ('name="jb"', 'name="jb" springdamper="1 1"', "springdamper is not supported"),
         ('name="jb"', 'name="jb" ref="0.1"', "ref is not supported"),
         ('name="jb"', 'name="jb" dampig="3"', "Did you mean 'damping'"),
         ('name="jb"', 'name="jb" class="hard"', "Unknown default class 'hard'"),

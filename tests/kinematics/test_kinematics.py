@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mechanisms import (
     TILTED,
@@ -17,6 +17,7 @@ from mechanisms import (
     parallelogram,
     rscr,
     rssr,
+    side_by_side,
     slider_crank,
     spherical_four_bar,
     welded_four_bar,
@@ -161,30 +162,25 @@ def test_the_papers_five_bar_moves_as_its_closed_form_says_on_both_modes(case, m
 
 # Links of 0.3 .. 2, where the tips of the cranks are neither too far apart nor too close.
 LENGTH = st.floats(0.3, 2.0)
+LENGTHS = st.tuples(LENGTH, LENGTH, LENGTH, LENGTH, LENGTH)
+ANGLE = st.floats(-3.1, 3.1)
+SIZE = st.sampled_from([1e-3, 1.0, 1e3])
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(
-    lengths=st.tuples(LENGTH, LENGTH, LENGTH, LENGTH, LENGTH),
-    psi=st.floats(-3.1, 3.1),
-    gamma=st.floats(-3.1, 3.1),
-    mode=st.sampled_from(list(paper.AssemblyMode)),
-    size=st.sampled_from([1e-3, 1.0, 1e3]),
-)
-def test_any_five_bar_in_reach_has_two_modes_and_stays_on_the_one_it_was_given(lengths, psi, gamma, mode, size):
-    a1, a2, a3, a4, a5 = lengths
+def placed(lengths: tuple[float, ...], psi: float, gamma: float, size: float) -> tuple[paper.FiveBar, float]:
+    """Return the linkage of these lengths times a size, and the distance of its cranks' tips without it."""
+    a1, _, _, a4, a5 = lengths
     apart = abs(a5 + a4 * np.exp(1j * gamma) - a1 * np.exp(1j * psi))
-    reachable = 1.05 * abs(a2 - a3) + 0.02 < apart < 0.95 * (a2 + a3)
-    linkage = paper.FiveBar(size * np.array(lengths), np.ones(4), np.ones(4), np.full(4, 0.5), np.zeros(4))
+    return paper.FiveBar(size * np.array(lengths), np.ones(4), np.ones(4), np.full(4, 0.5), np.zeros(4)), apart
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(lengths=LENGTHS, psi=ANGLE, gamma=ANGLE, mode=st.sampled_from(list(paper.AssemblyMode)), size=SIZE)
+def test_any_five_bar_in_reach_has_two_modes_and_stays_on_the_one_it_was_given(lengths, psi, gamma, mode, size):
+    linkage, apart = placed(lengths, psi, gamma, size)
+    _, a2, a3, _, _ = lengths
+    assume(1.05 * abs(a2 - a3) + 0.02 < apart < 0.95 * (a2 + a3))
     chain = linkage.chain()
-    if apart > 1.02 * (a2 + a3) or apart < 0.98 * abs(a2 - a3) - 0.02:
-        with pytest.raises(AssemblyError) as info:
-            fb.assemble(chain, (psi, gamma))
-        gap = max(apart - a2 - a3, abs(a2 - a3) - apart) * size
-        assert 0.3 * gap <= info.value.residual <= 1.3 * gap + 1e-6 * size
-        assert info.value.closure == "O3"
-    if not reachable:
-        return
     modes = fb.assembly_modes(chain, (psi, gamma))
     assert len(modes) == 2
     q = linkage.configuration(psi, gamma, mode=mode)
@@ -192,6 +188,19 @@ def test_any_five_bar_in_reach_has_two_modes_and_stays_on_the_one_it_was_given(l
     assert sum(own) == 1
     np.testing.assert_allclose(fb.assemble(chain, (psi, gamma), q), q, rtol=0.0, atol=1e-12)
     assert np.abs(fb.closure_residual(chain, modes)).max() <= 1e-12 * max(1.0, chain.length)
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(lengths=LENGTHS, psi=ANGLE, gamma=ANGLE, size=SIZE)
+def test_any_five_bar_out_of_reach_is_told_by_how_much(lengths, psi, gamma, size):
+    linkage, apart = placed(lengths, psi, gamma, size)
+    _, a2, a3, _, _ = lengths
+    gap = max(apart - a2 - a3, abs(a2 - a3) - apart)
+    assume(apart > 1.02 * (a2 + a3) or apart < 0.98 * abs(a2 - a3) - 0.02)
+    with pytest.raises(AssemblyError) as info:
+        fb.assemble(linkage.chain(), (psi, gamma))
+    assert 0.3 * gap * size <= info.value.residual <= 1.3 * gap * size + 1e-6 * size
+    assert info.value.closure == "O3"
 
 
 @pytest.mark.parametrize(
@@ -470,3 +479,25 @@ def test_one_sample_is_enough():
     one = Motion(np.array([0.5]), np.array([[2.0, 1.0]]), np.array([[1.0, -2.0]]), np.array([[3.0, 0.5]]))
     trajectory = fb.drive(chain, one)
     assert (len(trajectory), trajectory.q.shape, trajectory.N.shape) == (1, (1, 4), (1, 4, 2))
+
+
+PARALLELOGRAM, CRANK_ROCKER = (0.5, 1.0, 0.5, 1.0), (0.4, 1.1, 0.9, 1.0)
+
+
+@pytest.mark.parametrize("lengths", [(PARALLELOGRAM, CRANK_ROCKER), (CRANK_ROCKER, PARALLELOGRAM)])
+def test_one_loop_at_its_singularity_is_enough_whichever_it_is(lengths):
+    """Loops that share no joint are inverted one by one; the worst of them decides."""
+    chain = side_by_side(*lengths)
+    flat = lengths.index(PARALLELOGRAM)
+    q = np.zeros(6)
+    other = 3 * (1 - flat)
+    q[other : other + 3] = fb.assemble(four_bar(CRANK_ROCKER), [0.8])
+    assert np.abs(fb.closure_residual(chain, q)).max() <= 1e-12
+    with pytest.raises(SingularityError, match="type 2 singularity") as info:
+        fb.complement(chain, q)
+    assert info.value.sigma < 1e-7
+    upright = fb.assembly_modes(parallelogram(), [0.8])[0]
+    q[3 * flat : 3 * flat + 3] = upright
+    N = fb.complement(chain, q)
+    np.testing.assert_allclose(N[3 * flat : 3 * flat + 3, flat], fb.complement(parallelogram(), upright)[:, 0])
+    assert not N[3 * flat : 3 * flat + 3, 1 - flat].any()
