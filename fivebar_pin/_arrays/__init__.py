@@ -1,6 +1,6 @@
 """Array habits: check once at the boundary, copy in, freeze; write round-off as what it is."""
 
-from fivebar_pin._arrays.algebra import block_svd, cross, skew
+from fivebar_pin._arrays.algebra import block_svd, cross, inverse, skew
 from fivebar_pin._arrays.checks import all_of, checked, integer, number, numeric, reals, require_memory
 from fivebar_pin._arrays.immutable import Array, Immutable, frozen, seal
 from fivebar_pin._arrays.lazy import lazy
@@ -20,6 +20,7 @@ __all__ = [
     "finite",
     "frozen",
     "integer",
+    "inverse",
     "lazy",
     "number",
     "numeric",

@@ -20,9 +20,7 @@ LONGEST = 0.4  # longest predictor step of any coordinate [rad, or chain lengths
 _SHORTEST = 1e-7  # fraction of a step below which the search for a way on is given up
 _TRUST = 0.3  # largest correction, as a fraction of the step that was predicted
 _DROP = 0.2  # part of the singular value that a step must leave: a longer one may jump over a bifurcation unseen [-]
-_NOISE = (
-    1e-9  # correction that needs no step to be explained: what nodes are closed to leaves it [rad, or chain lengths]
-)
+_NOISE = 1e-9  # correction that needs no step to explain it: nodes are closed about as far [rad, or chain lengths]
 _APART = 1e-6  # distance of two closed configurations from which on they are two [rad, or chain lengths]
 _OUT_OF_REACH = 1e-8  # closure residual that a search leaves where nothing closes, at least [m or rad]
 _CORRECTIONS = 6  # Newton steps before a step counts as too long

@@ -2,9 +2,10 @@
 
     q_{k+1} = q_k + step(q_k),   J step = -residual, as far as the rule of the iteration has it
 
-A rule looks at the configurations reached and says where each sample goes next and which are done. There are four:
-passive coordinates alone from a good start (`polish`), any coordinates from a poor one (`search`), all coordinates by
-steps of least length (`manifold`), and independent coordinates held (`manifold`).
+A rule looks at the configurations reached and says where each sample goes next and which are done. Here are two: plain
+steps of the passive coordinates from a good start (`polish`), and damped ones of any coordinates from a poor one
+(`search`). Steps of least length in all coordinates, with the independent ones held, and back from a walk are rules of
+those who need them: `manifold`, `mobility` and the walk of balancing.
 """
 
 from __future__ import annotations

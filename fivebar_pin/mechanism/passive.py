@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array
-from fivebar_pin.mechanism.rank import inverse, pseudo_inverse
+from fivebar_pin._arrays import Array, inverse
+from fivebar_pin.mechanism.rank import pseudo_inverse
 
 __all__ = ["Group", "PassiveMap", "passive_map"]
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, block_svd
+from fivebar_pin._arrays import Array, block_svd, inverse
 
 __all__ = [
     "BRANCHING",
@@ -30,7 +30,6 @@ __all__ = [
     "Decomposed",
     "Factored",
     "factored",
-    "inverse",
     "pseudo_inverse",
     "ranks_of",
     "same_side",
@@ -227,38 +226,6 @@ def pseudo_inverse(J: Array) -> tuple[Array, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         X = np.matmul(np.swapaxes(Vt, 1, 2) / s[:, None, :], np.swapaxes(U, 1, 2))
     return X, smallest
-
-
-def inverse(M: Array) -> tuple[Array, Array]:
-    """Invert a batch of square matrices; singular ones become nan. Also return the determinants."""
-    if M.shape[-1] == 2:
-        return _inverse_of_two(M)
-    return _inverse(M), np.asarray(np.linalg.det(M))
-
-
-def _inverse_of_two(M: Array) -> tuple[Array, Array]:
-    """The usual case of one planar loop in closed form: by the cofactors, far cheaper than a factorisation."""
-    det = M[:, 0, 0] * M[:, 1, 1] - M[:, 0, 1] * M[:, 1, 0]
-    with np.errstate(divide="ignore"):
-        scale = np.where(det == 0.0, np.nan, 1.0 / det)
-    X = np.empty_like(M)
-    X[:, 0, 0], X[:, 1, 1] = M[:, 1, 1] * scale, M[:, 0, 0] * scale
-    X[:, 0, 1], X[:, 1, 0] = -M[:, 0, 1] * scale, -M[:, 1, 0] * scale
-    return X, det
-
-
-def _inverse(M: Array) -> Array:
-    """Invert a batch of square matrices by factorisation; singular ones become nan."""
-    try:
-        return np.asarray(np.linalg.inv(M))
-    except np.linalg.LinAlgError:
-        out = np.full_like(M, np.nan)
-        for i, Mi in enumerate(M):
-            try:
-                out[i] = np.linalg.inv(Mi)
-            except np.linalg.LinAlgError:
-                continue
-        return out
 
 
 def same_side(before: list[Array], after: list[Array]) -> npt.NDArray[np.bool_]:

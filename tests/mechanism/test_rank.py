@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
+from fivebar_pin._arrays import inverse
 from fivebar_pin.errors import SingularityError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
@@ -16,7 +17,6 @@ from fivebar_pin.mechanism.rank import (
     RANK_TOLERANCE,
     Decomposed,
     factored,
-    inverse,
     pseudo_inverse,
     ranks_of,
     same_side,
