@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +23,24 @@ from fivebar_pin.trajectory import Trajectory
 _SHOWN = 1e-7  # mass of material that is worth a row [of the moving mass]
 _MOST_POINTS = 10_000  # designs on a front; each is a problem to solve
 
-KINDS = ("force", "moment", "dynamic", "static")
-SOLVERS = ("clarabel", "scipy")  # as in `balancing.solvers`, without loading it
+
+class _Late:
+    """Choices that the library knows, asked for only where they are needed: help, and what was chosen."""
+
+    def __init__(self, module: str, table: str) -> None:
+        self._module, self._table = module, table
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(getattr(import_module(f"fivebar_pin.balancing.{self._module}"), self._table))
+
+    def __contains__(self, word: object) -> bool:
+        return word in tuple(self)
+
+
+_KINDS = _Late("conditions", "KINDS")
+_MODES = _Late("variables", "MODES")
+_SHAPES = _Late("pieces", "SHAPES")
+_SOLVERS = _Late("solvers", "SOLVERS")
 
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -40,7 +58,10 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     balance.add_argument("--minimise", action="append", metavar="TERM[=WEIGHT]", help="what to minimise; repeatable")
     balance.add_argument("--limit", action="append", metavar="TERM=VALUE", help="upper bound on a term; repeatable")
     balance.add_argument(
-        "--realise", choices=("disc", "bar", "ball"), help="solve for counterweights of this shape, and make them"
+        "--realise",
+        choices=_SHAPES,
+        metavar="SHAPE",
+        help="solve for counterweights of this shape, and make them: %(choices)s",
     )
     balance.add_argument(
         "--arm", type=float, help="side of the square arms that carry them [m]; 0: none [a fifth of a radius]"
@@ -131,7 +152,9 @@ def run_pareto(chosen: argparse.Namespace) -> int:
 
 def _common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
-    parser.add_argument("--kind", choices=KINDS, default="force", help="what is to vanish [force]")
+    parser.add_argument(
+        "--kind", choices=_KINDS, metavar="KIND", default="force", help="what is to vanish: %(choices)s [force]"
+    )
     add_gravity(parser)
     parser.add_argument(
         "--along",
@@ -143,7 +166,9 @@ def _common(parser: argparse.ArgumentParser) -> None:
 
 
 def _designing(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--mode", choices=("add", "redesign"), default="add", help="add material, or redesign [add]")
+    parser.add_argument(
+        "--mode", choices=_MODES, metavar="MODE", default="add", help="what may change: %(choices)s [add]"
+    )
     parser.add_argument("--bodies", nargs="+", metavar="JOINT", help="bodies that may change, by joint [all]")
     parser.add_argument("--radius", type=float, help="material lies within this distance of each joint [m]")
     parser.add_argument(
@@ -155,7 +180,9 @@ def _designing(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--thickness", type=float, help="of flat material [m] [a fifth of the mechanism's length]")
     parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
-    parser.add_argument("--solver", choices=SOLVERS, default=SOLVERS[0], help=f"of the conic program [{SOLVERS[0]}]")
+    parser.add_argument(
+        "--solver", choices=_SOLVERS, metavar="NAME", help="of the conic program: %(choices)s [the first of them]"
+    )
     parser.add_argument(
         "--branch",
         choices=("all", "motion"),
@@ -189,7 +216,7 @@ def _options(chosen: argparse.Namespace, chain: ClosedChain, trajectory: Traject
         "motions": [trajectory],
         "gravity": _direction(chosen, chain),
         "near": trajectory.q[0] if chosen.branch == "motion" else None,
-        "solver": chosen.solver,
+        **({} if chosen.solver is None else {"solver": chosen.solver}),
     }
 
 

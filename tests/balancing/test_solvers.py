@@ -18,8 +18,6 @@ from fivebar_pin.balancing.parameters import pseudo_inertia
 from fivebar_pin.balancing.solve import exact
 from fivebar_pin.balancing.solvers import SOLVERS, Block, Program, solve, solver_named
 from fivebar_pin.balancing.solvers import answer as answers
-from fivebar_pin.balancing.solvers import clarabel as clarabel_file
-from fivebar_pin.balancing.solvers import scipy as scipy_file
 from fivebar_pin.balancing.solvers.bound import lower_bound, reach
 from fivebar_pin.balancing.solvers.certificate import certificate_of
 from fivebar_pin.balancing.solvers.cones import outside, projected, scaling, smat, vector
@@ -164,7 +162,7 @@ def test_a_bound_of_a_design_counts_what_stationarity_leaves_over(monkeypatch: p
             yield answers.Answer(good.kind, good.x, z, good.status)
 
     real = solver_named("clarabel")
-    monkeypatch.setattr(clarabel_file, "answers", sloppy)
+    monkeypatch.setitem(SOLVERS, "clarabel", sloppy)
     design = problem.solve("added_mass")
     assert design.dual_bound <= best.objective
     assert max(seen) * problem.form.setting.mass > best.dual_bound
@@ -202,7 +200,7 @@ def test_no_answer_is_believed_unchecked(kind: str, monkeypatch: pytest.MonkeyPa
     def half(problem: object, tolerance: float) -> Iterator[answers.Answer]:
         yield answers.Answer(kind, np.array([5.001]), np.array([1.0, -0.6, -0.8]), "said with confidence")
 
-    monkeypatch.setattr(clarabel_file, "answers", half)
+    monkeypatch.setitem(SOLVERS, "clarabel", half)
     with pytest.raises(SolverError) as caught:
         solve(program, np.zeros(1), np.ones(1))
     assert kind == "unbounded" or caught.value.residual > caught.value.tolerance
@@ -215,7 +213,7 @@ def test_multipliers_outside_the_dual_cone_are_refused(monkeypatch: pytest.Monke
     def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
         yield answers.Answer("solved", np.array([6.0]), np.array([1.0, -2.0, 0.0]), "solved")
 
-    monkeypatch.setattr(clarabel_file, "answers", wrong)
+    monkeypatch.setitem(SOLVERS, "clarabel", wrong)
     with pytest.raises(SolverError, match="residual"):
         solve(program, np.zeros(1), np.ones(1))
 
@@ -247,9 +245,13 @@ def test_an_unknown_solver_is_refused_with_those_that_there_are() -> None:
 
 
 def test_the_command_line_knows_the_same_solvers(capsys: pytest.CaptureFixture[str]) -> None:
-    from fivebar_pin.cli.balance import SOLVERS as offered
-
-    assert offered == SOLVERS
+    with pytest.raises(SystemExit):
+        main(["balance", "--help"])
+    assert ", ".join(SOLVERS) in " ".join(capsys.readouterr().out.split())
+    with pytest.raises(SystemExit):
+        main(["balance", "five_bar_case_I", "--solver", "mosek"])
+    said = capsys.readouterr().err
+    assert all(name in said for name in SOLVERS)
     assert main(["balance", "five_bar_case_I", "--radius", "0.1", "--solver", "scipy"]) == 0
     assert "0.27" in capsys.readouterr().out
 
@@ -358,9 +360,9 @@ def test_where_the_default_has_no_acceptable_answer_the_second_is_asked(monkeypa
     def nothing(problem: Problem, tolerance: float) -> Iterator[answers.Answer]:
         yield answers.nothing(problem, "gave up")
 
-    monkeypatch.setattr(clarabel_file, "answers", nothing)
+    monkeypatch.setitem(SOLVERS, "clarabel", nothing)
     assert balance(chain, "force", region=Ball(0.1), material=None).objective == pytest.approx(0.27, abs=1e-6)
-    monkeypatch.setattr(scipy_file, "answers", nothing)
+    monkeypatch.setitem(SOLVERS, "scipy", nothing)
     with pytest.raises(SolverError, match="gave up"):
         balance(chain, "force", region=Ball(0.1))
 

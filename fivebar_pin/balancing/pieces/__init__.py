@@ -20,7 +20,7 @@ from __future__ import annotations
 from fivebar_pin.balancing.pieces.bar import Bar
 from fivebar_pin.balancing.pieces.disc import Disc
 from fivebar_pin.balancing.pieces.materials import MATERIALS
-from fivebar_pin.balancing.pieces.piece import Piece
+from fivebar_pin.balancing.pieces.piece import SHAPES, Piece
 from fivebar_pin.balancing.pieces.sphere import Sphere
 
-__all__ = ["MATERIALS", "Bar", "Disc", "Piece", "Sphere"]
+__all__ = ["MATERIALS", "SHAPES", "Bar", "Disc", "Piece", "Sphere"]

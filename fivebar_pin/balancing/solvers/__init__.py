@@ -3,24 +3,32 @@
     program = Program(n, blocks)                     # g + G x in K, once
     outcome = solve(program, P, q, solver="clarabel")
 
-A new solver is a module here with a function `answers(problem, tolerance)` and its name in `SOLVERS`.
+A new solver is a module with a function `answers(problem, tolerance)` that is registered under its name.
 """
 
 from __future__ import annotations
 
+from fivebar_pin.balancing.solvers import clarabel, scipy
+from fivebar_pin.balancing.solvers.answer import Answer
 from fivebar_pin.balancing.solvers.certificate import Certificate
 from fivebar_pin.balancing.solvers.cones import smat, svec
-from fivebar_pin.balancing.solvers.program import Block, Program
-from fivebar_pin.balancing.solvers.solving import DEFAULT, SECOND, SOLVERS, Outcome, solve, solver_named
+from fivebar_pin.balancing.solvers.program import Block, Problem, Program
+from fivebar_pin.balancing.solvers.registry import DEFAULT, SECOND, SOLVERS, register, solver_named
+from fivebar_pin.balancing.solvers.solving import Outcome, solve
 
 __all__ = [
     "DEFAULT",
     "SECOND",
     "SOLVERS",
+    "Answer",
     "Block",
     "Certificate",
     "Outcome",
+    "Problem",
     "Program",
+    "clarabel",
+    "register",
+    "scipy",
     "smat",
     "solve",
     "solver_named",

@@ -18,6 +18,7 @@ from fivebar_pin.errors import SolverError
 
 __all__ = ["Certificate", "certificate_of", "polished"]
 
+_PLAYS_A_PART = 1e-6  # multiplier of a row that is named as in conflict [of the largest]
 _LISTED = 8  # conflicts written out in a message
 _POLISHED = 4  # times a ray is moved onto G^T z = 0 and back into the dual cone
 _PROVES = 1e-2  # what a proof may leave open [-]; anything below one proves, the rest is for errors of the data
@@ -105,5 +106,5 @@ def _conflict(program: Program, z: Array, g: Array) -> dict[str, float]:
             share[label] = share.get(label, 0.0) - float(zi * gi)
             use[label] = max(use.get(label, 0.0), abs(float(zi)))
     largest = max(use.values(), default=0.0)
-    kept = [label for label in use if use[label] > 1e-6 * largest]
+    kept = [label for label in use if use[label] > _PLAYS_A_PART * largest]
     return {label: share[label] for label in sorted(kept, key=lambda k: -abs(share[k]))}

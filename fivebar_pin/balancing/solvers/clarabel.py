@@ -6,20 +6,21 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from fivebar_pin.balancing.solvers.answer import Answer, nothing
 from fivebar_pin.balancing.solvers.program import Block, Problem
+from fivebar_pin.balancing.solvers.registry import register
 from fivebar_pin.errors import SolverError
 
 __all__ = ["answers"]
 
+_FIRMER = 1e-10  # constant added to the diagonal of the linear system, for ill-conditioned programs [-]
 # The programs come well scaled, so the solver's own equilibration is left out at first; the others are for the rest.
 _ATTEMPTS: tuple[dict[str, object], ...] = (
     {"equilibrate_enable": False},
     {},
     {"max_step_fraction": 0.9},
-    {"static_regularization_constant": 1e-10},
+    {"static_regularization_constant": _FIRMER},
     {"equilibrate_enable": False, "max_step_fraction": 0.9},
 )
 _ITERATIONS = 300
@@ -29,12 +30,15 @@ _PANIC = "PanicException"  # what a panic in Rust arrives as; it is no Exception
 _CONES = {"zero": "ZeroConeT", "nonneg": "NonnegativeConeT", "soc": "SecondOrderConeT"}
 
 
+@register("clarabel")
 def answers(problem: Problem, tolerance: float) -> Iterator[Answer]:
     """Solve with one setting after the other, as long as answers are asked for.
 
     Raises:
         SolverError: Clarabel is not installed.
     """
+    from scipy import sparse
+
     clarabel = _clarabel()
     program, P = problem.program, problem.P
     minus_G = sparse.csc_matrix(-program.G)

@@ -22,6 +22,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.answer import Answer, nothing
 from fivebar_pin.balancing.solvers.barrier import Barrier, barriers
 from fivebar_pin.balancing.solvers.program import Problem
+from fivebar_pin.balancing.solvers.registry import register
 
 __all__ = ["answers"]
 
@@ -36,6 +37,8 @@ _NEWTON = 60  # steps of one stage
 _STAGES = 120
 _GIVE = 1e-10  # width given to cones without an interior, scaled as the program
 _SURE = 1e-3  # gap of the search for a start at which its end is negative beyond doubt, relative
+_STEEP = 0.5  # slope at the end of a step, over that at its start, that goes downhill still [-]
+_SHORTER, _SHORT = 0.6, 1e-10  # factor of a step that does not stay inside, and length that is none [-]
 _REFINED = 2  # corrections of z
 
 
@@ -102,6 +105,7 @@ class _Stage:
         return z
 
 
+@register("scipy")
 def answers(problem: Problem, tolerance: float) -> Iterator[Answer]:
     """Follow the path in large steps, then, if asked again, in small ones."""
     for factor in _FACTORS:
@@ -207,11 +211,11 @@ def _length(stage: _Stage, w: Array, dw: Array, tau: float) -> float:
     """Return the share of a step that stays inside and goes downhill."""
     steep = abs(float(stage.slope(w, tau) @ dw))
     length = 1.0
-    while length > 1e-10:
+    while length > _SHORT:
         moved = w + length * dw
-        if stage.inside(moved) and float(stage.slope(moved, tau) @ dw) <= 0.5 * steep:
+        if stage.inside(moved) and float(stage.slope(moved, tau) @ dw) <= _STEEP * steep:
             return length
-        length *= 0.6
+        length *= _SHORTER
     return 0.0
 
 

@@ -1,4 +1,4 @@
-"""Solve a program by any solver of the table, and check what it says.
+"""Solve a program by any solver, and check what it says.
 
 With z in the dual cone, a solution has P x + q = G^T z and no gap between x.P x / 2 + q.x and -g.z - x.P x / 2.
 """
@@ -6,22 +6,20 @@ With z in the dual cone, a solution has P x + q = G^T z and no gap between x.P x
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.balancing.solvers.answer import Answer, Solver
+from fivebar_pin.balancing.solvers.answer import Answer
 from fivebar_pin.balancing.solvers.bound import lower_bound, refined
 from fivebar_pin.balancing.solvers.certificate import Certificate, certificate_of
 from fivebar_pin.balancing.solvers.program import Problem, Program
-from fivebar_pin.errors import SolverError, UnknownNameError
+from fivebar_pin.balancing.solvers.registry import DEFAULT, solver_named
+from fivebar_pin.errors import SolverError
 
-__all__ = ["DEFAULT", "SECOND", "SOLVERS", "Outcome", "solve", "solver_named"]
+__all__ = ["Outcome", "solve"]
 
-SOLVERS = ("clarabel", "scipy")  # each is the module of this name beside this one, with its function `answers`
-DEFAULT = "clarabel"
-SECOND = "scipy"  # asked where the default has no acceptable answer
+_TOLERANCE = 1e-8  # residual and gap of an answer that is accepted [of the size of its numbers]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,18 +41,6 @@ class Outcome(Immutable):
     certificate: Certificate | None
 
 
-def solver_named(name: str) -> Solver:
-    """Return a solver of the table.
-
-    Raises:
-        UnknownNameError: there is none of this name.
-    """
-    if name not in SOLVERS:
-        raise UnknownNameError("solver", name, SOLVERS)
-    solver: Solver = import_module(f"fivebar_pin.balancing.solvers.{name}").answers
-    return solver
-
-
 def solve(
     program: Program,
     P: Array,
@@ -62,7 +48,7 @@ def solve(
     *,
     margin: float = 0.0,
     give: float = 0.0,
-    tolerance: float = 1e-8,
+    tolerance: float = _TOLERANCE,
     solver: str = DEFAULT,
 ) -> Outcome:
     """Solve for a diagonal P (n,) and q (n,), the cones tightened by a margin, or soft bounds given way by `give`.
