@@ -20,9 +20,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from fivebar_pin import balancing, closures, io, motion, paper, viz
-    from fivebar_pin import planar as planar
-    from fivebar_pin import shipped as shipped
+    from fivebar_pin import balancing, closures, io, motion, paper, planar, shipped, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure, ClosureKind
@@ -70,9 +68,11 @@ __all__ = [
     "motion",
     "paper",
     "pareto",
+    "planar",
     "reduced_dynamics",
     "save",
     "score",
+    "shipped",
     "simulate",
     "viz",
 ]

@@ -5,15 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
-
-if TYPE_CHECKING:
-    from fivebar_pin.closures.closure import Closure
 
 __all__ = ["Anchored", "Poses", "Rates", "Segment"]
 
@@ -55,6 +52,17 @@ class Segment:
     rod: bool
 
 
+class Named(Protocol):
+    """What is asked of the closure itself, see `Closure`."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def row_names(self) -> tuple[str, ...]: ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Anchored(ABC):
     """A closure with what it joins found in one model. What `look` saw is handed to all the others.
@@ -67,7 +75,7 @@ class Anchored(ABC):
         columns: velocity coordinates that move its rows, ascending.
     """
 
-    closure: Closure
+    closure: Named
     rows: slice
     joints: tuple[int, int]
     tied: tuple[int, ...]

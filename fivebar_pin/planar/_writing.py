@@ -4,26 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from fivebar_pin._files import as_path, write_set
-from fivebar_pin.planar._parts import ALUMINIUM, GROUND, THICKNESS, WIDTH, Link, Section
-
-if TYPE_CHECKING:
-    from fivebar_pin.planar.linkage import Linkage
+from fivebar_pin.planar._parts import (
+    ALUMINIUM,
+    GROUND,
+    THICKNESS,
+    WIDTH,
+    Gear,
+    Link,
+    Lump,
+    Motor,
+    PointSpring,
+    Section,
+)
 
 __all__ = ["linkage_text", "write_linkage"]
 
 _DOWN = (0.0, -9.81, 0.0)
 
 
-def write_linkage(linkage: Linkage, path: object, *, overwrite: bool) -> Path:
+class Description(Protocol):
+    """What a linkage is made of, see `Linkage`."""
+
+    name: str
+    gravity: tuple[float, ...]
+    sketch: dict[str, complex]
+    links: dict[str, Link]
+    lumps: list[Lump]
+    springs: list[PointSpring]
+    gears: list[Gear]
+    motors: list[Motor]
+
+
+def write_linkage(linkage: Description, path: object, *, overwrite: bool) -> Path:
     """Write the file and return its path."""
     target = as_path(path)
     return write_set(target.parent, {target.name: linkage_text(linkage)}, overwrite=overwrite)[0]
 
 
-def linkage_text(linkage: Linkage) -> str:
+def linkage_text(linkage: Description) -> str:
     """Return the text of the file; every number reads back exactly."""
     links = linkage.links
     bars = [link for link in links.values() if link.guide is None and link.name != GROUND]

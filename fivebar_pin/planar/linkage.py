@@ -28,6 +28,7 @@ from fivebar_pin.planar._parts import (
     PointSpring,
     Section,
 )
+from fivebar_pin.planar._writing import write_linkage
 
 __all__ = ["Linkage"]
 
@@ -247,8 +248,6 @@ class Linkage:
         Raises:
             OutputError: the file exists already, or cannot be written.
         """
-        from fivebar_pin.planar._writing import write_linkage
-
         return write_linkage(self, path, overwrite=overwrite)
 
     def _add(self, link: Link) -> None:
