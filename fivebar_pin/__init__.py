@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure, ClosureKind
     from fivebar_pin.diagnosis import Diagnosis, diagnose
-    from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics
+    from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics, reduced_dynamics
     from fivebar_pin.errors import FiveBarPinError
     from fivebar_pin.io import save
-    from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
+    from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive, frame_motion
     from fivebar_pin.motion import Motion
     from fivebar_pin.planar.loading import load
     from fivebar_pin.simulation import simulate
@@ -63,12 +63,14 @@ __all__ = [
     "drive",
     "energy_balance",
     "forward_dynamics",
+    "frame_motion",
     "inverse_dynamics",
     "io",
     "load",
     "motion",
     "paper",
     "pareto",
+    "reduced_dynamics",
     "save",
     "score",
     "simulate",
@@ -80,10 +82,10 @@ _LATE = {
     "chain": ("ClosedChain", "Visual"),
     "closures": ("Closure", "ClosureKind"),
     "diagnosis": ("Diagnosis", "diagnose"),
-    "dynamics": ("Loads", "energy_balance", "forward_dynamics", "inverse_dynamics"),
+    "dynamics": ("Loads", "energy_balance", "forward_dynamics", "inverse_dynamics", "reduced_dynamics"),
     "errors": ("FiveBarPinError",),
     "io": ("save",),
-    "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive"),
+    "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive", "frame_motion"),
     "motion": ("Motion",),
     "paper": (),
     "planar": (),

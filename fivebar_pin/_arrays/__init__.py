@@ -3,6 +3,7 @@
 from fivebar_pin._arrays.algebra import block_svd, cross, skew
 from fivebar_pin._arrays.checks import all_of, checked, integer, number, numeric, reals, require_memory
 from fivebar_pin._arrays.immutable import Array, Immutable, frozen, seal
+from fivebar_pin._arrays.lazy import lazy
 from fivebar_pin._arrays.results import finite
 from fivebar_pin._arrays.rounding import ROUND_OFF, TINY, figures, settled, table_text
 
@@ -19,6 +20,7 @@ __all__ = [
     "finite",
     "frozen",
     "integer",
+    "lazy",
     "number",
     "numeric",
     "reals",

@@ -14,13 +14,15 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, frozen
 from fivebar_pin.balancing.parameters import Space, plane_axes
-from fivebar_pin.balancing.walk import HELD, Ground, Walk, ground
+from fivebar_pin.balancing.walk import Ground, Walk, ground
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.closing import Limits, polish, residual_of, search
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.plane import plane_normal
+from fivebar_pin.mechanism.rank import HELD
 from fivebar_pin.mechanism.tree import Poses
 
 __all__ = ["Samples", "SpaceName", "closed_at", "random_samples", "space_of"]
@@ -190,8 +192,8 @@ class _Draw:
                 q = search(loops, starts, columns=np.arange(loops.tree.nv), limits=self._limits, iterations=_SEARCH)
                 self._note(q)
                 q = polish(loops, q).q
-            here = ground(loops, q)
-            good = here.regular() & (here.control > HELD) & self._limits.inside(loops, q)
+            here = ground(Configurations(loops, q))
+            good = here.sound & (here.control > HELD) & self._limits.inside(loops, q)
             if loops.m:
                 good &= ~loops.opposed(loops.pairs(loops.tree.poses(q)))
             self._tried += starts.shape[0]
@@ -240,7 +242,7 @@ class _Draw:
                 bound = f"must lie within its limits [{low:.6g}, {high:.6g}]"
                 raise InvalidInputError(f"actuated joint {joint} in near", float(value), bound)
         self._tried = 1
-        return ground(loops, q)
+        return ground(Configurations(loops, q))
 
     def _too_few(self, wanted: int) -> AssemblyError:
         name, size = self._open

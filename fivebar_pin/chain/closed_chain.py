@@ -154,6 +154,18 @@ class ClosedChain(Immutable):
         real = [s for s in spans if s > 0.0]
         return float(np.mean(real)) if real else 1.0
 
+    def columns(self, joint: str) -> tuple[slice, slice]:
+        """Return where a joint's coordinates are in a configuration q and in v, a.
+
+        Raises:
+            UnknownNameError: there is no such joint.
+        """
+        if joint not in self.joints:
+            raise UnknownNameError("joint", joint, self.joints)
+        j = self.model.getJointId(joint)
+        q, v, own = int(self.model.idx_qs[j]), int(self.model.idx_vs[j]), self.model.joints[j]
+        return slice(q, q + int(own.nq)), slice(v, v + int(own.nv))
+
     def with_inertias(self, inertias: Mapping[str, pin.Inertia]) -> ClosedChain:
         """Return the same mechanism with other inertias for the named joints' bodies."""
         model = self.model.copy()

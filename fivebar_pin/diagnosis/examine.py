@@ -14,7 +14,7 @@ from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
 from fivebar_pin.dynamics.reactions import reactions
 from fivebar_pin.mechanism import mobility
-from fivebar_pin.mechanism.closing import closed_enough, residual_of
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
@@ -23,7 +23,6 @@ from fivebar_pin.trajectory import Trajectory
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "diagnose"]
 
 _CLOSED = 1e-9  # closure residual up to which a given configuration counts as closed [m or rad]
-_REACHED = 1e-12  # the same for configurations found here
 _NEAR = 1e-2  # distance to a type 2 singularity that is worth a warning [-]
 _STILL = 1e-8  # scaled speed below which a joint counts as standing still [-]
 _SETS = 12  # actuated sets listed
@@ -50,7 +49,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     findings: list[Finding] = []
     start, gap = _start(chain, q, seed, findings)
     here = mobility.site_at(loops, start)
-    generic = mobility.generic_site(chain, here, seed, _REACHED) if _is_closed(loops, start) else here
+    generic = mobility.generic_site(chain, here, seed, CLOSED) if _is_closed(loops, start) else here
     if q is None and here.rank < generic.rank:
         findings.append(Finding("warning", _jump(chain, here, generic, "the configuration nearest to the neutral one")))
         here, gap = generic, float(generic.gap[0])
@@ -100,12 +99,12 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
     """Return a closed configuration to look at and the gap of the one asked for; report what is open."""
     loops = loops_of(chain)
     if q is None:
-        found, gap = mobility.first_closed(chain, seed, _REACHED)
+        found, gap = mobility.first_closed(chain, seed, CLOSED)
         asked, opened = found, gap
     else:
         asked = checked("q", q, (chain.nq,))
         asked = np.array(pin.normalize(chain.model, asked))
-        found = mobility.close(chain, asked[None], _REACHED)[0][0]
+        found = mobility.close(chain, asked[None], CLOSED)[0][0]
         opened, gap = (float(mobility.gap(loops, x[None])[0]) for x in (found, asked))
         if not _is_closed(loops, asked):
             name, size = loops.worst(residual_of(loops, asked[None])[0])

@@ -27,11 +27,11 @@ from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.manifold import Manifold, manifold_of
 
-__all__ = ["EquationsOfMotion", "ReducedEquations", "Slip"]
+__all__ = ["STICKING", "EquationsOfMotion", "ReducedEquations", "Slip"]
 
 
 _FEW = 6  # up to here one Pinocchio call per sample beats the batch
-_STICKING = 1e-10  # yield of joints that stick, as part of the largest, below which they hold each other [-]
+STICKING = 1e-10  # yield of joints that stick, as part of the largest, below which they hold each other [-]
 _MASSLESS = 1e-13  # smallest to largest eigenvalue of the reduced inertia below which it counts as singular [-]
 
 
@@ -112,7 +112,7 @@ class EquationsOfMotion:
             E = eq.N[:, slip.stuck]
             yields = _solve_inertia(eq.inertia, np.swapaxes(E, 1, 2))
             excess = np.matmul(E, free) + eq.held[:, slip.stuck, None]
-            free = free - np.matmul(yields, np.matmul(np.linalg.pinv(np.matmul(E, yields), rcond=_STICKING), excess))
+            free = free - np.matmul(yields, np.matmul(np.linalg.pinv(np.matmul(E, yields), rcond=STICKING), excess))
         return np.asarray(eq.held + np.matmul(eq.N, free)[..., 0])
 
     def equations(self, point: Configurations, v: Array, applied: Array, rank: int) -> ReducedEquations:

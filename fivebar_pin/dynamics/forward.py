@@ -15,9 +15,10 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.equations import EquationsOfMotion
 from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.mechanism.closing import closed_enough
 from fivebar_pin.mechanism.configurations import Configurations
 
-__all__ = ["constant_torque", "forward_dynamics", "require_consistent"]
+__all__ = ["constant_torque", "forward_dynamics", "require_closed", "require_consistent"]
 
 
 _CLOSED = 1e-8  # closure residual and velocity mismatch that a given state may have [-]
@@ -66,7 +67,7 @@ def forward_dynamics(
     given = constant_torque(chain, tau)
     T = checked("tau", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na))
     point = system.manifold.at(Q)
-    require_consistent(system, point, V)
+    require_consistent(point, V)
     applied = system.wrench_forces(point, checked_wrenches(chain, external, n))
     applied[:, chain.actuated_index] += T
     a = system.accelerations(point, V, applied, system.manifold.rank_of(point))
@@ -79,21 +80,17 @@ def constant_torque(chain: ClosedChain, tau: npt.ArrayLike | None) -> Array:
     return given.reshape(1) if given.ndim == 0 and chain.na == 1 else given
 
 
-def require_consistent(system: EquationsOfMotion, point: Configurations, v: Array) -> None:
-    loops, scale = system.manifold.loops, system.manifold.scale
+def require_consistent(point: Configurations, v: Array) -> None:
+    """Raise unless configurations are closed and velocities v (n, nv) keep them so.
+
+    Raises:
+        InvalidInputError: names the closure, or the rate, and the state.
+    """
+    loops = point.loops
     if not loops.m:
         return
-    gap = np.abs(point.residual).max(axis=1)
-    worst = int(np.argmax(gap))
-    if gap[worst] > _CLOSED * max(1.0, loops.length):
-        name, size = loops.worst(point.residual[worst])
-        raise InvalidInputError(
-            f"closure {name} at state {worst}",
-            size,
-            f"must be below {_CLOSED:g} m or rad",
-            "Use assemble, or simulate(initial='project').",
-        )
-    u = v / scale
+    require_closed(point)
+    u = v / loops.column_scale
     rate = point.independent.rate(u)
     bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), TINY)
     worst = int(np.argmax(rate - bound))
@@ -103,4 +100,22 @@ def require_consistent(system: EquationsOfMotion, point: Configurations, v: Arra
             float(rate[worst]),
             "must vanish: this velocity opens the loops",
             "Use v = complement(chain, q) @ v_actuated, or simulate(initial='project').",
+        )
+
+
+def require_closed(point: Configurations) -> None:
+    """Raise unless configurations are closed.
+
+    Raises:
+        InvalidInputError: names the closure and the state.
+    """
+    loops = point.loops
+    worst = int(np.argmax(point.gap)) if point.gap.size else 0
+    if loops.m and point.gap.size and not closed_enough(loops, point.gap, _CLOSED)[worst]:
+        name, size = loops.worst(point.residual[worst])
+        raise InvalidInputError(
+            f"closure {name} at state {worst}",
+            size,
+            f"must be below {_CLOSED:g} m or rad",
+            "Use assemble, or simulate(initial='project').",
         )

@@ -75,6 +75,16 @@ class Loads(Immutable):
         """Closure forces and joint reactions; components that the model leaves open are nan."""
         return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external)
 
+    def torque_of(self, joint: str) -> Array:
+        """Return the torque of one actuated joint (n,) [N m or N].
+
+        Raises:
+            UnknownNameError: it is not one of the actuated joints.
+        """
+        if joint not in self.chain.actuated:
+            raise UnknownNameError("actuated joint", joint, self.chain.actuated)
+        return self.torque[:, self.chain.actuated.index(joint)]
+
     @property
     def joint_reactions(self) -> Array:
         """Wrench by the parent on the body of every joint, about the joint origin (n, njoints - 1, 6) [N, N m].
@@ -103,7 +113,8 @@ class Loads(Immutable):
         """Forces in the rows of every closure by its name (n, rows); nan where redundant rows leave them open.
 
         Of a coupling sum_k c_k q_k = offset it is what is transmitted: it acts with the torque c_k lambda in joint k
-        [N m or N, divided by the unit of c_k]. Of a distance it is the force that stretches the rod [N].
+        [N m or N, divided by the unit of c_k]. Of a distance it is the force with which the rod pushes
+        its ends apart [N].
         """
         r = self.reactions
         values = np.where(r.determinate_rows, r.multipliers, np.nan)

@@ -11,15 +11,14 @@ from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
 from fivebar_pin.kinematics.branch import follow, node_at
-from fivebar_pin.mechanism.closing import closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.rank import SINGULAR
 
-__all__ = ["CLOSED", "assemble", "checked_search", "closed_from_starts", "closure_residual"]
+__all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual"]
 
 
-CLOSED = 1e-12  # closure residual that counts as closed [m or rad]
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
 _NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
 _MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once

@@ -19,18 +19,19 @@ from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops
 
-__all__ = ["STEP", "Closed", "Limits", "Rule", "closed_enough", "iterate", "polish", "residual_of", "search"]
+__all__ = ["CLOSED", "STEP", "Closed", "Limits", "Rule", "closed_enough", "iterate", "polish", "residual_of", "search"]
 
 
 Rule = Callable[[Configurations, npt.NDArray[np.intp]], tuple[Array, npt.NDArray[np.bool_]]]
 """What to do with configurations reached (k) by samples of these numbers (k,): where they go next (k, nq), and which
 of them go on (k,); those that do not stay where they are put."""
 
+CLOSED = 1e-12  # closure residual that counts as closed: some thousand units in the last place [m or rad]
 STEP = 0.5  # longest Newton step of a damped search [rad, or chain lengths]
 _POLISHED = 1e-9  # scaled residual below which one more Newton step reaches round-off: it squares it [-]
 _ASTRAY = 1e3  # sum of Newton steps beyond which a sample is given up [rad, or chain lengths]
 
-_CLOSED = 1e-20  # half the squared scaled residual that a search is content with: 1e-10, for `polish` to end [-]
+_CONTENT = 1e-20  # half the squared scaled residual that a search is content with: 1e-10, for `polish` to end [-]
 _FLAT = 1e-14  # gradient of it below which the search stands at a stationary point [-]
 _DAMPING = 1e-3  # of the first step, as part of the mean slope [-]
 _LEAST_DAMPING, _MOST_DAMPING, _STUCK = 1e-12, 1e8, 1e7  # bounds, and from where on steps lead nowhere [-]
@@ -147,7 +148,7 @@ class _Passive:
         step[finished | lost] = 0.0
         self.size[which[lost]] = np.inf
         self.correction[which] += np.abs(step / loops.column_scale[loops.passive]).max(axis=1, initial=0.0)
-        self._last[which] = np.abs(here.residual * loops.row_scale).max(axis=1, initial=0.0) < _POLISHED
+        self._last[which] = here.error < _POLISHED
         q = loops.tree.integrate(here.q, _spread(loops, step, loops.passive))
         return q, np.isfinite(self.size[which]) & (self.correction[which] < _ASTRAY)
 
@@ -197,7 +198,7 @@ class _Damped:
             damping = np.where(better, self._damping[which] / _LIGHTER, self._damping[which] * _HEAVIER)
             self._damping[which] = np.clip(damping, _LEAST_DAMPING, _MOST_DAMPING)
             flat = np.abs(self._gradient[which]).max(axis=(1, 2), initial=0.0) < _FLAT
-            going = ~((self._value[which] < _CLOSED) | (self._damping[which] >= _STUCK) | flat)
+            going = ~((self._value[which] < _CONTENT) | (self._damping[which] >= _STUCK) | flat)
         self._begun = True
         out = np.array(here.q)
         if going.any():

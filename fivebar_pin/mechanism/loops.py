@@ -129,9 +129,9 @@ class Loops:
         flags = [c.opposed(x) for c, x in zip(self.anchored, pairs, strict=True)]
         return np.asarray(np.any(flags, axis=0))
 
-    def passive_map(self, blocks: list[Array]) -> PassiveMap:
+    def passive_map(self, blocks: list[Array], n: int) -> PassiveMap:
         """Invert the passive columns of the Jacobian's blocks, see `passive.passive_map`."""
-        return passive_map(self._groups, blocks, (self.passive.size, self.actuated.size))
+        return passive_map(self._groups, blocks, n, (self.passive.size, self.actuated.size))
 
     def scaled(self, J: Array, rows: _Index = slice(None), columns: _Index = slice(None)) -> Array:
         """Return closure Jacobians (..., m, nv), or these rows and columns of them, in one unit: lengths do not matter.

@@ -72,9 +72,8 @@ class PassiveMap:
         return out
 
 
-def passive_map(groups: list[Group], blocks: list[Array], size: tuple[int, int]) -> PassiveMap:
-    """Invert the passive columns of the Jacobian's blocks. Singular samples get sigma = 0 and X = nan."""
-    n = blocks[0].shape[0] if blocks else 1
+def passive_map(groups: list[Group], blocks: list[Array], n: int, size: tuple[int, int]) -> PassiveMap:
+    """Invert the passive columns of the Jacobian's blocks at n samples. Singular ones get sigma = 0 and X = nan."""
     X, tall, sigma, sign = [], [], np.full(n, 1.0), np.ones((n, len(groups)))
     for k, (g, J) in enumerate(zip(groups, blocks, strict=True)):
         Jp = np.matmul(g.reduce, J[:, :, g.passive_columns]) * g.scale

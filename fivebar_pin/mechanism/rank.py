@@ -26,6 +26,7 @@ __all__ = [
     "RANK_TOLERANCE",
     "SINGULAR",
     "TIED",
+    "UNDRIVEN",
     "Decomposed",
     "Factored",
     "factored",
@@ -34,6 +35,7 @@ __all__ = [
     "ranks_of",
     "same_side",
     "singular_values",
+    "smallest_values",
     "truncated_inverse",
 ]
 
@@ -59,6 +61,11 @@ HELD = 1e-6
 """Singular value of the passive columns down to which the motors still hold the mechanism for certain [-].
 
 Ten times the one at which they do not, so that samples taken above it can be driven.
+"""
+UNDRIVEN = 1e-12
+"""Singular value of the motors' part of the tangent below which they do not determine a simulated motion at all [-].
+
+A simulation does not need the motors to determine it: all that it can say of its motors is said, down to round-off.
 """
 BRANCHING = 1e-3
 """Singular value of all columns below which two branches of a mechanism are too near to be told apart on a walk [-].
@@ -173,18 +180,22 @@ class Factored:
 
 def factored(J: Array, rank: int) -> Factored:
     """Factorise scaled Jacobians (n, m, nv) of a rank: by Q R when it is that of all rows."""
-    if J.shape[1] == rank:
+    n, m, nv = J.shape
+    if not m:
+        T = np.broadcast_to(np.eye(nv), (n, nv, nv))
+        return Factored(T, np.zeros((n, nv, 0)), np.ones(n), np.zeros(n))
+    if m == rank:
         Q, R = np.linalg.qr(np.swapaxes(J, 1, 2), mode="complete")
         X, _ = inverse(np.swapaxes(R[:, :rank], 1, 2))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             sigma = 1.0 / np.sqrt(np.einsum("nij,nij->n", X, X))
             back = np.matmul(Q[:, :, :rank], X)
-        return Factored(Q[:, :, rank:], back, np.where(np.isfinite(sigma), sigma, 0.0), np.zeros(J.shape[0]))
+        return Factored(Q[:, :, rank:], back, np.where(np.isfinite(sigma), sigma, 0.0), np.zeros(n))
     U, s, Vt = np.linalg.svd(J)  # rows that depend on each other wherever the loops are closed
     V = np.swapaxes(Vt, 1, 2)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         back = np.matmul(V[:, :, :rank] / s[:, None, :rank], np.swapaxes(U[:, :, :rank], 1, 2))
-    return Factored(V[:, :, rank:], back, s[:, rank - 1] if rank else np.ones(J.shape[0]), s[:, rank])
+    return Factored(V[:, :, rank:], back, s[:, rank - 1] if rank else np.ones(n), s[:, rank])
 
 
 def ranks_of(s: Array) -> npt.NDArray[np.intp]:
@@ -197,6 +208,11 @@ def singular_values(J: Array) -> Array:
     if 0 in J.shape:
         return np.zeros(0)
     return np.asarray(np.linalg.svd(J, compute_uv=False) if J.size < _WHOLE else block_svd(J)[1])
+
+
+def smallest_values(M: Array) -> Array:
+    """Return the smallest singular values of a batch of matrices (n, k, f) -> (n,)."""
+    return np.asarray(np.linalg.svd(M, compute_uv=False)[:, -1])
 
 
 def truncated_inverse(J: Array) -> Array:

@@ -12,7 +12,7 @@ import pinocchio as pin
 from fivebar_pin.chain import BarBody, ClosedChain, Geometry, LumpBody, Placement, PlateBody, Visual
 from fivebar_pin.chain.bodies import Body
 from fivebar_pin.chain.reshape import with_bodies
-from fivebar_pin.closures import Closure, ClosureKind, Coupling
+from fivebar_pin.closures import Closure, Coupling
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.planar._parts import GROUND, Gear, Link, Lump, Motor, PointSpring
 from fivebar_pin.planar._shape import Moves, Shape, back, link_poses
@@ -161,7 +161,7 @@ class _Builder:
         for cut in self.tree.cuts:
             if not cut.at:
                 end = frame_of(cut.second, self.links[cut.second].points[0])
-                yield Closure((f"{block_of(cut.second)}_link", end), ClosureKind.WELD, name=cut.second)
+                yield Closure((f"{block_of(cut.second)}_link", end), "6d", name=cut.second)
                 continue
             met[cut.at] = met.get(cut.at, 0) + 1
             name = cut.at if met[cut.at] == 1 else f"{cut.at}_{met[cut.at]}"

@@ -33,6 +33,7 @@ __all__ = [
 _TURNED = 0.7  # cosine between chart and tangent space at which the chart is changed
 _FAR = 1.5  # distance from its middle at which a chart is changed [rad, or chain lengths]
 _SMOOTH = 0.02  # mismatch of a step with the velocities and accelerations at its ends, relative
+_UNFELT = 1e-12  # mismatch that is round-off, however short the step [rad, or chain lengths]
 _NO_END = 1e-5  # scaled singular value that a step may not end below: round-off would show in the velocity [-]
 _NEARLY_SINGULAR = 1e-3  # scaled singular value at which a failure is put down to a bifurcation [-]
 
@@ -179,7 +180,7 @@ def is_smooth(system: EquationsOfMotion, node: Node, reached: Node) -> bool:
     way = system.manifold.loops.tree.difference(node.point.q, reached.point.q)[0] / scale
     expected = h * (0.5 * (node.v + reached.v) + h / 12.0 * (node.a - reached.a)) / scale
     size = max(float(np.abs(x).max(initial=0.0)) for x in (way, h * node.v / scale, h * reached.v / scale))
-    return float(np.abs(way - expected).max(initial=0.0)) <= _SMOOTH * size + 1e-12
+    return float(np.abs(way - expected).max(initial=0.0)) <= _SMOOTH * size + _UNFELT
 
 
 def between(system: EquationsOfMotion, node: Node, reached: Node, t: float) -> Array:

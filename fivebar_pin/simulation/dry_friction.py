@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.dynamics.equations import EquationsOfMotion, Slip
+from fivebar_pin.dynamics.equations import STICKING, EquationsOfMotion, Slip
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.simulation.chart_motion import ChartMotion, ClosedState, Inputs, Node, between, first_node
 
@@ -27,6 +27,8 @@ __all__ = ["REST", "Settled", "Watch", "settle"]
 _SAMPLES = 8  # states of a step at which slipping and sticking is looked at
 _BISECTIONS = 48
 REST = 1e-10  # speed of a joint, relative to the fastest, below which it is at rest [-]
+_SLOWEST = 1e-9  # speed that counts as motion where nothing has moved yet [rad/s, or chain lengths per s]
+_GAUSS = 1e-14  # tolerance of the least-squares problem: round-off [-]
 _HOLDS = 1e-9  # acceleration of a joint that sticks, relative to what its friction can cause [-]
 
 
@@ -79,7 +81,7 @@ def _friction_at_rest(inertia: Array, force: Array, E: Array, h: Array, f: Array
     force = force + inertia @ (np.linalg.pinv(E) @ h)
     L = np.linalg.cholesky(inertia)
     A, b = np.linalg.solve(L, E.T), np.linalg.solve(L, force)
-    torque = np.asarray(lsq_linear(A * f, b, bounds=(-1.0, 1.0), method="bvls", tol=1e-14).x) * f
+    torque = np.asarray(lsq_linear(A * f, b, bounds=(-1.0, 1.0), method="bvls", tol=_GAUSS).x) * f
     return torque, np.asarray(A.T @ (b - A @ torque))
 
 
@@ -88,7 +90,7 @@ class Watch:
 
     def __init__(self, system: EquationsOfMotion, inputs: Inputs, rank: int) -> None:
         self.system, self.inputs, self.rank = system, inputs, rank
-        self.fastest = 1e-9  # speed seen so far [rad/s, or chain lengths per s]
+        self.fastest = _SLOWEST  # seen so far [rad/s, or chain lengths per s]
 
     def start(self, state: ClosedState, t: float) -> Node:
         """Settle the joints at rest in a state and return its node; `slip` tells how."""
@@ -153,6 +155,6 @@ def _stopped(system: EquationsOfMotion, state: ClosedState, stuck: npt.NDArray[n
     """Return the velocity (nv,) with the joints at rest made exactly so."""
     T = state.point.independent.tangent(state.rank)[0] * system.manifold.scale[:, None]
     w = T.T @ (state.v / system.manifold.scale**2)
-    v = T @ (w - np.linalg.pinv(T[stuck], rcond=1e-10) @ (T[stuck] @ w)) if stuck.size else np.array(state.v)
+    v = T @ (w - np.linalg.pinv(T[stuck], rcond=STICKING) @ (T[stuck] @ w)) if stuck.size else np.array(state.v)
     v[stuck] = 0.0
     return np.asarray(v)

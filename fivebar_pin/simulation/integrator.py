@@ -37,6 +37,7 @@ __all__ = ["run"]
 
 
 _RETRIES = 40
+_SHORTEST = 1e-13  # step, as part of the time reached or a second, that no longer moves the time [-]
 _LOOK = 100  # steps after which the way done is looked at
 _NOWHERE = 1e-4  # share of the time that all the steps would cover at the present rate, below which they are not taken
 _CROSS = 2.0  # time to a singular instant, in usual steps, from which on one step over it is tried
@@ -142,7 +143,7 @@ class _Steps:
                 self.node, self.h = reached, solver.h_abs
                 return lambda: refine(motion, h, solver.dense_output())
             self.h, self._solver = 0.25 * (solver.t - self.node.t), None
-            if self.h < 1e-13 * max(1.0, abs(self.node.t)):
+            if self.h < _SHORTEST * max(1.0, abs(self.node.t)):
                 break
         raise failure(self.node, self.rank, "the step cannot be made short enough")
 

@@ -8,7 +8,9 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.rank import UNDRIVEN, smallest_values
 from fivebar_pin.simulation.chart_motion import ChartMotion, Node, between, failure, sigma_of
 from fivebar_pin.simulation.singular_step import lagrange
 from fivebar_pin.trajectory import Trajectory
@@ -21,7 +23,6 @@ Interpolant = Callable[[float], Array]
 _CLOSE = 0.03  # scaled singular value below which a sample is interpolated from its neighbours, at most [-]
 _DIP = 0.2  # the same, of the larger value at the two ends of the step
 _THROUGH = 20  # states that such an interpolation goes through
-_DETERMINED = 1e-12  # scaled slope of the actuated joints below which they do not determine the motion [-]
 
 
 class Record:
@@ -91,7 +92,7 @@ class _Across:
         dq = dq + manifold.scale * (B @ (xi - B.T @ (dq / manifold.scale)))
         v = v + manifold.scale * (B @ (u - B.T @ (v / manifold.scale)))
         q = manifold.loops.tree.integrate(self.motion.chart.q[None], dq[None])[0]
-        return manifold.project(q, 1e-12), v, a
+        return manifold.project(q, CLOSED), v, a
 
 
 def _complement(system: EquationsOfMotion, q: Array, rank: int) -> Array:
@@ -104,7 +105,9 @@ def _complement(system: EquationsOfMotion, q: Array, rank: int) -> Array:
     N = np.full((q.shape[0], chain.nv, chain.na), np.nan)
     if chain.na < chain.nv - rank or not chain.na:
         return N
-    T = system.manifold.at(q).independent.tangent(rank) * system.manifold.scale[:, None]  # (n, nv, f)
-    regular = np.linalg.svd(T[:, index] / system.manifold.scale[index, None], compute_uv=False)[:, -1] > _DETERMINED
-    N[regular] = np.matmul(T[regular], np.linalg.pinv(T[regular][:, index]))
+    tangent, scale = system.manifold.at(q).independent.tangent(rank), system.manifold.scale
+    driven = tangent[:, index]  # what the motors see of it (n, na, f)
+    regular = smallest_values(driven) > UNDRIVEN
+    T = tangent[regular] * scale[:, None]
+    N[regular] = np.matmul(T, np.linalg.pinv(T[:, index]))
     return N

@@ -19,6 +19,7 @@ from fivebar_pin.dynamics.equations import EquationsOfMotion
 from fivebar_pin.dynamics.forward import constant_torque, require_consistent
 from fivebar_pin.dynamics.wrenches import Wrench, require_frames
 from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.simulation.chart_motion import ClosedState, Inputs
 from fivebar_pin.simulation.integrator import run
 from fivebar_pin.trajectory import Trajectory
@@ -97,8 +98,8 @@ def _initial_state(system: EquationsOfMotion, q: Array, v: Array, initial: str) 
     """Return the state brought to round-off, once it is consistent or asked to be made so."""
     manifold = system.manifold
     if initial == "check":
-        require_consistent(system, manifold.at(np.array(q[None])), v[None])
-    point = manifold.project(q, 1e-12)
+        require_consistent(manifold.at(np.array(q[None])), v[None])
+    point = manifold.project(q, CLOSED)
     rank = manifold.rank_of(point)
     if rank == system.chain.nv:
         raise InvalidInputError("mobility", 0, "must be at least one: the mechanism cannot move")

@@ -107,6 +107,12 @@ def test_the_factorisation_for_a_known_rank_agrees_with_the_decomposition(m, nv,
     assert f.tied.max() < 1e-12
 
 
+def test_nothing_to_factorise_leaves_everything_free():
+    f = factored(np.zeros((2, 0, 3)), 0)
+    np.testing.assert_array_equal(f.tangent, np.broadcast_to(np.eye(3), (2, 3, 3)))
+    assert (f.back.shape, f.sigma.tolist(), f.tied.tolist()) == ((2, 3, 0), [1.0, 1.0], [0.0, 0.0])
+
+
 def test_a_rank_above_the_one_expected_shows_in_the_tie():
     assert factored(matrices(4, 6, 4), 3).tied.min() > 1e-3
 
