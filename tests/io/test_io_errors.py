@@ -103,7 +103,11 @@ BAD_URDF = [
     ('damping="0.1"', 'dampig="0.1"', "did you mean 'damping'"),
     ("<box ", "<bix ", "Unknown shape 'bix'"),
     ('size="0.1 0.1 0.1"', 'size="0.1 0.1"', "must be 3 number(s)"),
-    ("</joint>", '<mimic joint="j2"/></joint>', "<mimic> is not supported"),
+    ("</joint>", '<mimic joint="j9"/></joint>', "mimic[0]: Unknown joint of closure j1 mimic 'j9'; known: j1, j2"),
+    ("</joint>", '<mimic joint="j1"/></joint>', "joint 'j1': mimics itself"),
+    ("</joint>", '<mimic multiplier="2"/></joint>', "<mimic> needs the attribute 'joint'"),
+    ("</joint>", '<mimic joint="j2" ratio="2"/></joint>', "Unknown attribute of <mimic> 'ratio'"),
+    ("</joint>", '<mimic joint="j2" multiplier="two"/></joint>', "'two', which is not a finite number"),
     ('name="base"', 'name="universe"', "name of the fixed world"),
     ("<link name", "<lnk name", "did you mean 'link'"),
 ]
