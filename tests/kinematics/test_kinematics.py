@@ -585,7 +585,7 @@ def test_a_limit_is_passed_by_any_amount_that_is_not_rounding(side, off):
     assert len(fb.drive(chain, swinging(2.0, 1.0), free.q[0])) == 60
     getattr(model, f"{side}PositionLimit")[3] = reached - sign * off
     chain = fb.ClosedChain(model, base.closures, base.actuated)
-    with pytest.raises(InvalidInputError, match="joint right_elbow at sample .* must stay within its limits"):
+    with pytest.raises(InvalidInputError, match=r"joint right_elbow at sample .* must stay within its limits"):
         fb.drive(chain, swinging(2.0, 1.0), free.q[0])
 
 
