@@ -56,7 +56,7 @@ def solves() -> list[tuple[str, ...]]:
         )
         first, _ = best_of(lambda: problem.solve(dict.fromkeys(objectives, 1.0)), repeats=1)  # noqa: B023
         again, design = best_of(lambda: problem.solve({o: 1.0 + k for k, o in enumerate(objectives)}))  # noqa: B023
-        size = f"{problem.program.n}, {problem.program.g.size}"
+        size = f"{problem.form.program.n}, {problem.form.program.g.size}"
         milli = (f"{1e3 * first:.3g} ms", f"{1e3 * again:.3g} ms")
         out.append((", ".join(objectives), size, *milli, f"{design.gap:.1e}"))
     return out

@@ -278,7 +278,7 @@ class Written:
         least = self.M / (2.0 * np.pi * disc.density * disc.thickness * self.L**2)
         self.constraints.append(cp.quad_over_lin(h, m) + least * cp.square(m) <= cp.trace(S))
         region, E = self.case.arguments["region"] or Ball(self.L), self.axes(b)
-        semi, off = np.asarray(region.semi_axes) / self.L, h - E @ np.asarray(region.center) / self.L * m
+        semi, off = np.asarray(region.half_extents()) / self.L, h - E @ np.asarray(region.center) / self.L * m
         w = np.sqrt(2.0 * least) * cp.power(m, 1.5)
         if isinstance(region, Ball):
             self.constraints.append(cp.norm(off) + w <= semi[0] * m)
@@ -293,7 +293,7 @@ class Written:
         cp, E = self.cp, self.axes(b)
         region = self.case.arguments["region"] or Ball(self.L)
         c3 = np.asarray(region.center) / self.L
-        semi = np.asarray(region.semi_axes) / self.L
+        semi = np.asarray(region.half_extents()) / self.L
         c = E @ c3
         about = S - cp.reshape(c, (self.d, 1), order="C") @ cp.reshape(h, (1, self.d), order="C")
         about = about - cp.reshape(h, (self.d, 1), order="C") @ c[None] + np.outer(c, c) * m

@@ -23,10 +23,13 @@ import fivebar_pin as fb
 import fivebar_pin.chain
 from fivebar_pin import balancing, errors, paper
 from fivebar_pin._arrays import Immutable
-from fivebar_pin.balancing import solvers
+from fivebar_pin.balancing import objectives, solvers
 from fivebar_pin.balancing.branches import Branch
+from fivebar_pin.balancing.objectives.overreach import Overreach
+from fivebar_pin.balancing.pieces.trial import Size, Trial
 from fivebar_pin.balancing.solvers.answer import Answer
 from fivebar_pin.balancing.solvers.program import Problem
+from fivebar_pin.balancing.variables import Stated
 from fivebar_pin.paper import polar
 from fivebar_pin.paper.positions import position
 from fivebar_pin.springs import JointSpring, Spring
@@ -42,13 +45,13 @@ ABSTRACT = (fb.Closure, fb.closures.Anchored, fb.closures.FrameClosure)  # of wh
 WORKSHOPS = (
     "walk",
     "sampling",
-    "setting",
-    "lifting",
+    "solve",
     "counterweight_search",
-    "objectives.making",
     "regressors.body_motion",
+    "regressors.quantity",
     "solvers.barrier",
 )
+ELLIPSOID = balancing.Ellipsoid((0.1, 0.2, 0.3))
 INNER = ("viz", "cli", "io", "__main__", *(f"balancing.{m}" for m in WORKSHOPS))  # whose values no result holds
 EXAMPLES = {"float": 1.5e-3, "int | None": 7, "float | None": 0.25, "Iterable[str]": ("a", "b"), "object": "motor 1"}
 
@@ -195,6 +198,7 @@ def specimens() -> tuple[object, ...]:
     inner += (*small, balancing.pieces.Bar("steel", 0.01), balancing.pieces.Sphere("steel"))
     own = (
         *inner,
+        *forms(five, moved),
         paper.balance_mass_centres(linkage),
         paper.conditions(linkage),
         paper.audit_table_1(),
@@ -203,6 +207,9 @@ def specimens() -> tuple[object, ...]:
         fb.frame_motion(chain, trajectory, "coupler_end"),
         fb.diagnosis.propose_closures(fb.ClosedChain(five.model, (), ())),
         fb.diagnosis.propose_motors(five),
+        fb.diagnosis.propose_closures(fb.ClosedChain(five.model, (), ())),
+        fb.diagnosis.propose_motors(five),
+        fb.frame_motion(chain, trajectory, "coupler_end"),
     )
     bodies = (fb.chain.BarBody(("a", "b"), 0.5), fb.chain.LumpBody(("a",), 1.0))
     plate = fb.chain.PlateBody(("a", "b", "c"), 2700.0, 0.01)
@@ -214,6 +221,22 @@ def specimens() -> tuple[object, ...]:
         *(both, *regions, *more, *own, fb.Visual("crank_body", "sphere", (0.1,)), Spring("a", "b", 1.0, 0.5)),
         *(JointSpring("a", 1.0, 0.0), paper.compare_complements(linkage, moved, mode="left")),
     )
+
+
+def forms(chain: fb.ClosedChain, motion: fb.Motion) -> Iterator[object]:
+    """Yield conic programs with variables, regions and pieces of every kind, and what they are made of."""
+    where = {"psi": balancing.Ball(0.1), "gamma": balancing.Box((0.2, 0.2, 0.2)), "phi_gamma": ELLIPSOID}
+    kinds = {"psi": balancing.Disc("steel", 0.01), "gamma": balancing.Sphere("steel")}
+    names = list(objectives.known())
+    every = {"region": where, "motions": [motion], "objectives": names}
+    first = balancing.balance_problem(chain, "force", counterweight=kinds, remove=["psi"], **every)
+    for problem in (first, balancing.balance_problem(chain, "force", mode="redesign", **every)):
+        form = problem.form
+        yield from (problem, form, form.cost({atom: 1.0 for atom in problem.objectives}))
+        yield objectives.Designs(form.setting, form.measurement, form.parts, form.E, form.X0, form.E, form.X0)
+        yield form.parts[0].part.make(form.setting, np.ones(form.parts[0].part.size), chain.inertial_parameters)
+    sizes = {0: Size(0.1, np.zeros(2))}
+    yield from (Trial(sizes), Stated(), Overreach())
 
 
 def graph(root: object, seen: dict[int, object] | None = None) -> dict[int, object]:
@@ -264,7 +287,8 @@ def test_every_public_value_is_of_the_kind_that_stays_read_only():
 
 def test_a_specimen_of_every_public_value_is_looked_at():
     met = {type(x) for root in specimens() for x in graph(root).values()}
-    assert sorted(kind.__name__ for kind in public_values() - met) == []
+    left = [kind.__name__ for kind in public_values() - met if not inspect.isabstract(kind)]
+    assert sorted(left) == []
 
 
 @pytest.mark.parametrize("way", WAYS)

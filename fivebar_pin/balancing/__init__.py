@@ -72,16 +72,20 @@ References:
 
 from __future__ import annotations
 
+from fivebar_pin.balancing import objectives, regions, solvers, variables
 from fivebar_pin.balancing.balanced import balance
+from fivebar_pin.balancing.change import Change
+from fivebar_pin.balancing.comparison import Comparison, compare
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
 from fivebar_pin.balancing.counterweights import Counterweight, Realisation, realise
-from fivebar_pin.balancing.design import Certificate, Change, Design
-from fivebar_pin.balancing.fronts import Comparison, ParetoFront, alici_shirinzadeh, compare, pareto
-from fivebar_pin.balancing.pieces.piece import MATERIALS, Bar, Disc, Sphere
+from fivebar_pin.balancing.design import Certificate, Design
+from fivebar_pin.balancing.fronts import ParetoFront, pareto
+from fivebar_pin.balancing.pieces import MATERIALS, Bar, Disc, Sphere
 from fivebar_pin.balancing.problem import BalanceProblem, balance_problem
-from fivebar_pin.balancing.regions.region import Ball, Box, Ellipsoid
+from fivebar_pin.balancing.regions import Ball, Box, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
 from fivebar_pin.balancing.scoring import Scores, score
+from fivebar_pin.balancing.sum_of_squares import alici_shirinzadeh
 from fivebar_pin.balancing.variations import variations
 
 __all__ = [
@@ -109,9 +113,13 @@ __all__ = [
     "balance_conditions",
     "balance_problem",
     "compare",
+    "objectives",
     "pareto",
     "realise",
+    "regions",
     "regressor",
     "score",
+    "solvers",
+    "variables",
     "variations",
 ]

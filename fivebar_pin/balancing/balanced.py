@@ -11,14 +11,14 @@ import numpy.typing as npt
 from fivebar_pin.balancing.branches import Branch, branches, configurations_meant
 from fivebar_pin.balancing.conditions import BalanceConditions, conditions_for
 from fivebar_pin.balancing.design import Design
-from fivebar_pin.balancing.objectives.making import weights_of
+from fivebar_pin.balancing.objectives.weights import Minimised, weights_of
 from fivebar_pin.balancing.pieces.piece import Piece
-from fivebar_pin.balancing.problem import balance_problem
+from fivebar_pin.balancing.problem import Limits, aim_of, balance_problem
 from fivebar_pin.balancing.regions.region import Region
 from fivebar_pin.balancing.regressors.measures import Motions
 from fivebar_pin.balancing.sampling import SpaceName
-from fivebar_pin.balancing.setting import MassBounds
 from fivebar_pin.balancing.solvers import DEFAULT
+from fivebar_pin.balancing.variables.variable import MassBounds, Variable
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
 
@@ -29,17 +29,18 @@ def balance(
     chain: ClosedChain,
     kind: str | None = "force",
     *,
-    minimise: str | Mapping[str, float] | None = None,
+    minimise: Minimised | None = None,
     bodies: Sequence[str] | None = None,
-    mode: Literal["add", "redesign"] = "add",
+    mode: str = "add",
     region: Region | Mapping[str, Region] | None = None,
     masses: MassBounds = None,
     material: str | float | None = "steel",
     thickness: float | None = None,
     counterweight: Piece | Mapping[str, Piece] | None = None,
     remove: Sequence[str] = (),
+    variables: Sequence[Variable] = (),
     motions: Motions = (),
-    limits: Mapping[str, npt.ArrayLike] | None = None,
+    limits: Limits | None = None,
     gravity: npt.ArrayLike | Literal["any", "model"] = "any",
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     near: npt.ArrayLike | None = None,
@@ -53,11 +54,11 @@ def balance(
     Args:
         chain: the mechanism.
         kind: what is exact: "force", "moment", "dynamic", "static", or None for nothing.
-        minimise: a term, or terms with weights: added_mass [kg], inertia (mean trace of N^T M N of the bodies, rotors
-            apart) [kg m2], distance (to the present design, scaled) [-], and rms_, peak_ or mean_square_ of torque,
-            shaking_force, shaking_moment, frame_force, frame_moment, bearing_force, angular_momentum (its deviation
-            from the mean) over the motions: what `inverse_dynamics` of the design calls so, all components. The added
-            mass unless given, for a redesign the distance.
+        minimise: a term, or terms with weights, by name or as atoms of `objectives`: added_mass [kg], inertia (mean
+            trace of N^T M N of the bodies, rotors apart) [kg m2], distance (to the present design, scaled) [-], and
+            rms_, peak_ or mean_square_ of torque, shaking_force, shaking_moment, frame_force, frame_moment,
+            bearing_force, angular_momentum (its deviation from the mean) over the motions: what `inverse_dynamics` of
+            the design calls so, all components. The added mass unless given, for a redesign the distance.
         bodies: names of the joints whose bodies may change; all that influence the conditions unless given.
         mode: "add" material to the present bodies, or "redesign" them.
         region: where material may lie, one for all bodies or by body; a ball about the joint frame with the chain's
@@ -74,6 +75,8 @@ def balance(
             part of the design. See `realise`.
         remove: bodies that material may also be taken from, up to half of their mass; what is left is a body, in
             space too.
+        variables: what may change, said in full, in place of mode, bodies, region, masses, material, counterweight and
+            remove: see `variables`.
         motions: motions (driven from `near`) or trajectories that terms and limits refer to.
         limits: upper bounds on terms; "peak_torque" takes one for every motor too.
         gravity, about, near, space, seed: as for `balance_conditions`.
@@ -95,7 +98,7 @@ def balance(
             physical to begin with, terms without motions.
         SolverError: no solution to the tolerance and no proof either.
     """
-    terms = weights_of(minimise, mode)
+    terms = weights_of(aim_of(mode, variables) if minimise is None else minimise)
 
     def solved(conditions: BalanceConditions | None, near: npt.ArrayLike | None) -> Design:
         problem = balance_problem(
@@ -110,6 +113,7 @@ def balance(
             thickness=thickness,
             counterweight=counterweight,
             remove=remove,
+            variables=variables,
             motions=motions,
             limits=limits,
             gravity=gravity,

@@ -15,13 +15,16 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, frozen
-from fivebar_pin.balancing.design import PROVED, Change, Design, change_of
+from fivebar_pin.balancing.change import Change, change_of
+from fivebar_pin.balancing.design import PROVED, Design
 from fivebar_pin.balancing.parameters import Space, plane_axes
-from fivebar_pin.balancing.pieces.piece import ARM, Piece, Sphere, ball_radius, density_of
+from fivebar_pin.balancing.pieces.materials import density_of
+from fivebar_pin.balancing.pieces.piece import Piece
+from fivebar_pin.balancing.pieces.trial import Size, Trial
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError
 
-__all__ = ["Maker", "Size", "Sizes", "arm_of", "arm_width", "outer_radius"]
+__all__ = ["CounterweightSearch", "arm_of", "outer_radius"]
 
 _STEPS = 60  # designs tried until size and place of the pieces stay
 _SETTLED = 1e-6  # change of the objective from design to design [of its size]
@@ -40,39 +43,24 @@ _GUESSES = (1.0, 0.5, 0.25, 0.75, 0.1)  # first sizes tried, between the solid p
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Size(Immutable):
-    """Outer radius and centre (2,) or (3,) about which a piece is bounded from above, in chain lengths.
-
-    Where `stray` is given, the centre stays within that distance.
-    """
-
-    radius: float
-    center: Array
-    stray: float | None = None
-
-
-Sizes = Mapping[int, Size]  # by index of the body
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Maker(Immutable):
+class CounterweightSearch(Immutable):
     """Looks for a design that can be made.
 
     Attributes:
         chain, space: the mechanism and its parameters.
         pieces: what the material added to a body is made as, by its index.
         rooms: largest radius of a piece, by the index of its body [m].
-        solve: gives the optimum for sizes, parameters (nb, 10) of arms, and bodies that get nothing.
+        solve: gives the optimum for what is tried and parameters (nb, 10) of arms; where pieces are elastic, the
+            design whose pieces stick out of their regions least.
         unit: typical size of the objective.
-        fit: gives the design whose pieces stick out of their regions least, for the same.
+        without: bodies that get nothing.
     """
 
     chain: ClosedChain
     space: Space
     pieces: Mapping[int, Piece]
     rooms: Mapping[int, float]
-    solve: Callable[[Sizes, Array, frozenset[int]], Design]
-    fit: Callable[[Sizes, Array, frozenset[int]], Design]
+    solve: Callable[[Trial, Array], Design]
     unit: float
     without: frozenset[int] = frozenset()
 
@@ -101,7 +89,7 @@ class Maker(Immutable):
         """Return the design for these bodies or the proof, the last one tried, and why there is none of both."""
         last, failure = None, SolverError("no counterweights were tried")
         try:
-            bound = self.solve({}, np.zeros((len(self.chain.joints), 10)), self.without)
+            bound = self.solve(Trial({}, self.without), np.zeros((len(self.chain.joints), 10)))
             if not bound.feasible:
                 return bound, None, failure
             last, settled = self._settle(self._first(bound))
@@ -149,7 +137,7 @@ class Maker(Immutable):
         nothing, design = np.zeros((len(self.chain.joints), 10)), bound
         for _ in range(_FITS):
             try:
-                design = self.fit(self._sizes(design, None), nothing, self.without)
+                design = self.solve(Trial(self._sizes(design, None), self.without, elastic=True), nothing)
                 if not design.feasible:
                     return None
                 return self._next(self._sizes(design, None), nothing)
@@ -192,15 +180,15 @@ class Maker(Immutable):
                 problem = str(error)
         raise SolverError(f"the arms of the counterweights leave no design ({problem})")
 
-    def _next(self, sizes: Sizes, carried: Array) -> Design:
-        design = self.solve(sizes, carried, self.without)
+    def _next(self, sizes: Mapping[int, Size], carried: Array) -> Design:
+        design = self.solve(Trial(sizes, self.without), carried)
         if not design.feasible:
             raise SolverError("the counterweights do not fit about the size and place tried")
         return design
 
     def _stated(self, design: Design) -> Design:
         """Return the design with the bound on all designs with these arms, and what it can claim."""
-        bound = self.solve({}, self._parameters(design.arms), self.without)
+        bound = self.solve(Trial({}, self.without), self._parameters(design.arms))
         below = bound.dual_bound if bound.feasible else design.dual_bound
         scale = max(abs(design.objective), self.unit)
         met = design.objective - below <= PROVED * scale
@@ -216,7 +204,7 @@ class Maker(Immutable):
             change, axes, L = by_name[self.chain.joints[b]], self.space.axes[b], self.space.length
             room = self.rooms[b]
             r = outer_radius(piece, change, axes)
-            if guess is not None and not isinstance(piece, Sphere):
+            if guess is not None:
                 solid = outer_radius(piece, replace(change, inertia=np.zeros((3, 3))), axes)
                 r = min(r, solid + guess * max(0.0, room - solid))
             r = max(r, _THIN * room) if change.mass > 0.0 else _GUESSED * room
@@ -252,26 +240,14 @@ class Maker(Immutable):
 
 
 def outer_radius(piece: Piece, change: Change, axes: Array) -> float:
-    """Return the outer radius [m] of the piece with the mass and inertia of a change (or the solid piece's)."""
-    m = change.mass
-    if m <= 0.0:
-        return 0.0
-    if isinstance(piece, Sphere):
-        return ball_radius(density_of(piece.density), m)
-    solid = piece.solid(axes, 1.0, 1.0)
-    inertia = max(float(axes[2] @ change.inertia @ axes[2]), solid.least * m * m)
-    return float(np.sqrt(solid.alpha * inertia / m + solid.beta * m))
-
-
-def arm_width(piece: Piece, radius: float) -> float:
-    """Return the width and thickness of the arm of a piece of an outer radius [m]."""
-    return ARM * radius if piece.arm is None else piece.arm
+    """Return the outer radius [m] of the piece with the mass and inertia of a change; 0 without mass."""
+    return piece.outer_radius(change.mass, change.inertia, axes) if change.mass > 0.0 else 0.0
 
 
 def arm_of(piece: Piece, change: Change, axes: Array, planar: bool) -> Change | None:
     """Return the arm from the joint to the rim of a piece: a bar of its material, or None where none is needed."""
     radius = outer_radius(piece, change, axes)
-    width = arm_width(piece, radius)
+    width = piece.arm_width(radius)
     flat = change.place - axes[2] * float(axes[2] @ change.place) if planar else change.place
     distance = float(np.linalg.norm(flat))
     reach = distance - radius

@@ -20,26 +20,22 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, figures, frozen
-from fivebar_pin.balancing.counterweight_search import arm_width
-from fivebar_pin.balancing.design import Change, Design
-from fivebar_pin.balancing.objectives.term import base, measure_of
+from fivebar_pin.balancing.change import Change
+from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.parameters import Space, plane_axes
-from fivebar_pin.balancing.pieces.piece import Bar, Disc, Piece, Sphere, ball_radius, density_of, thickness_of
-from fivebar_pin.balancing.problem import assembled
-from fivebar_pin.balancing.regions.region import Ball, resolve
-from fivebar_pin.balancing.regressors.measures import reflected_inertia
+from fivebar_pin.balancing.pieces.materials import density_of, thickness_of
+from fivebar_pin.balancing.pieces.piece import SHAPES, Piece
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["Counterweight", "Realisation", "realise"]
 
-SHAPES: Mapping[str, type[Piece]] = {"disc": Disc, "bar": Bar, "ball": Sphere}
 COLOUR = (0.86, 0.36, 0.10, 1.0)  # of every counterweight: by it the viewer knows them, in files too
 _SAME = 1e-6  # difference of realised and promised terms that counts as none [of the term or its size before]
 _FITS = 2e-5  # length that a piece may stick out of its region, for round-off [chain lengths]
 _SHOWN = 1e-3  # the same that is worth a word [radii of the piece]
 _EXACT = 1e-9  # residual of the conditions that counts as balanced [of the moving mass]
-_BORED = 1e-5  # bore below this share of the area is not drilled [-]
+_ROUND_OFF = 1e-12  # difference of terms that is none, whatever their size [their unit]
 _RIM = 720  # points of a rim that are asked whether they lie in the region
 
 
@@ -75,10 +71,7 @@ class Counterweight(Immutable):
     arm_size: tuple[float, ...]
 
     def __str__(self) -> str:
-        size = " x ".join(f"{1e3 * s:.4g}" for s in self.size)
-        if self.shape == "disc":
-            r, bore, t = (1e3 * s for s in self.size)
-            size = f"radius {r:.4g}, " + (f"bore radius {bore:.4g}, " if bore else "") + f"thickness {t:.4g}"
+        size = SHAPES[self.shape].words(self.size)
         place = ", ".join(f"{1e3 * x:.4g}" for x in np.round(self.pose[:3, 3], 9) + 0.0)
         out_of = f", {1e3 * self.overhang:.3g} mm out of its region"
         out = out_of if self.overhang > _SHOWN * self.radius else ""
@@ -133,7 +126,7 @@ class Realisation(Immutable):
     @cached_property
     def terms(self) -> dict[str, float]:
         """The same, measured on the bodies that were made."""
-        return {name: self._measured(name) for name in self.promised}
+        return {name: self.design.value(name, self.parameters) for name in self.promised}
 
     @property
     def figures(self) -> dict[str, tuple[str, str]]:
@@ -157,7 +150,7 @@ class Realisation(Immutable):
         """Whether what was made is balanced, lies in its regions, and has the terms that the design promises."""
         before = {**self.design.terms, **self.design.before}
         same = all(
-            abs(self.terms[k] - x) <= _SAME * max(abs(x), abs(before.get(k, 0.0))) + 1e-12
+            abs(self.terms[k] - x) <= _SAME * max(abs(x), abs(before.get(k, 0.0))) + _ROUND_OFF
             for k, x in self.promised.items()
         )
         reach = self.design.original.length
@@ -174,21 +167,6 @@ class Realisation(Immutable):
             return f"optimal: no counterweights {kind} are better than {d.dual_bound:.9g}"
         best = f"none {kind} is better than {d.dual_bound:.9g}"
         return f"not proved optimal: objective {d.objective_text(digits=9)}, {best}"
-
-    def _measured(self, name: str) -> float:
-        d, pi = self.design, self.parameters
-        if name == "added_mass":
-            return float(pi[:, 0].sum()) - d.original.mass
-        if name == "inertia":
-            assert d.asked is not None
-            return float(reflected_inertia(d.original, d.asked.given.paths) @ pi.reshape(-1))
-        if name == "distance":
-            difference = d.space.of(pi - d.original.inertial_parameters).reshape(-1)
-            return float(np.linalg.norm(difference / (d.space.scale * (d.original.mass or 1.0))))
-        measured = measure_of(name)
-        assert measured is not None
-        value = getattr(d.rows[measured], base(name).split("_")[0])(pi)
-        return float(value**2 if name.startswith("mean_square_") else value)
 
     @cached_property
     def chain(self) -> ClosedChain:
@@ -234,7 +212,7 @@ def realise(
         word = shape or ("disc" if design.space.planar else "ball")
         piece = piece_of(design.original, word, material, thickness, arm)
         wanted = {c.body: piece if asked else design.pieces.get(c.body, piece) for c in design.added}
-        if not all(body in design.pieces and _alike(piece, design.pieces[body]) for body, piece in wanted.items()):
+        if not all(body in design.pieces and piece.alike(design.pieces[body]) for body, piece in wanted.items()):
             design = _solved_in(design, wanted)
             _ = design.chain
     made = [_make(design, c) for c in design.added if c.mass > 0.0]
@@ -252,73 +230,31 @@ def piece_of(
     if shape not in SHAPES:
         raise UnknownNameError("shape", shape, SHAPES)
     stuff = "steel" if material is None else material
-    if shape == "ball":
-        return Sphere(density_of(stuff), arm)
-    thick = thickness_of(thickness, chain.length)
-    return (Disc if shape == "disc" else Bar)(density_of(stuff), thick, arm=arm)
-
-
-def _alike(asked: Piece, made: Piece) -> bool:
-    """Return whether a piece is of the kind asked for; its line and arm are its own."""
-    if type(asked) is not type(made) or density_of(asked.density) != density_of(made.density):
-        return False
-    thin = isinstance(asked, Sphere) or isinstance(made, Sphere) or asked.thickness == made.thickness
-    return thin and (asked.arm is None or asked.arm == made.arm)
+    return SHAPES[shape].of(density_of(stuff), thickness_of(thickness, chain.length), arm)
 
 
 def _solved_in(design: Design, pieces: Mapping[str, Piece]) -> Design:
     asked = design.asked
     if asked is None:
         raise InvalidInputError("design", design.status, "must come from balance, to be solved again in pieces")
-    problem = assembled(replace(asked.given, counterweight=dict(pieces)))
-    return replace(
-        problem.solve(asked.minimise, limits=asked.limits),
-        alternatives=design.alternatives,
-    )
-
-
-def flat_size(shape: str, mass: float, inertia: float, density: float, thickness: float) -> tuple[float, float]:
-    """Return (radius, bore) of a disc or (length, width) of a bar, the most compact where the inertia is too small.
-
-    A bore below a thousandth of the radius is not drilled.
-    """
-    area = mass / (density * thickness)
-    if shape == "disc":
-        total = max(2.0 * inertia / mass, area / np.pi)  # r^2 + b^2
-        difference = area / np.pi
-        bore = total - difference
-        return float(np.sqrt(0.5 * (total + difference))), float(np.sqrt(0.5 * bore)) if bore > _BORED * total else 0.0
-    squares = max(12.0 * inertia / mass, 2.0 * area)  # l^2 + w^2
-    plus, minus = np.sqrt(squares + 2.0 * area), np.sqrt(max(squares - 2.0 * area, 0.0))
-    return float(0.5 * (plus + minus)), float(0.5 * (plus - minus))
+    solved = asked.problem.in_pieces(pieces).solve(asked.minimise, limits=asked.limits)
+    return replace(solved, alternatives=design.alternatives)
 
 
 def _make(design: Design, change: Change) -> Counterweight:
     space = design.space
     piece, b, m = design.pieces[change.body], space.bodies.index(change.body), change.mass
-    density, shape = density_of(piece.density), next(k for k, kind in SHAPES.items() if isinstance(piece, kind))
-    axes = np.array(space.axes[b])
-    pose = np.eye(4)
-    pose[:3, 3] = change.place
-    if isinstance(piece, Sphere):
-        r = radius = ball_radius(density, m)
-        size: tuple[float, ...] = (r,)
-        inertia = np.eye(3) * 0.4 * m * r * r
-    else:
-        wanted = float(axes[2] @ change.inertia @ axes[2])
-        long, short = flat_size(shape, m, wanted, density, piece.thickness)
-        size = (long, short, piece.thickness)
-        radius = long if shape == "disc" else 0.5 * float(np.hypot(long, short))
-        x = _along(change.place, axes)
-        pose[:3, :3] = np.column_stack([x, np.cross(axes[2], x), axes[2]])
-        own = _own_inertia(shape, m, size)
-        inertia = pose[:3, :3] @ np.diag(own) @ pose[:3, :3].T
+    axes, pose = np.array(space.axes[b]), np.eye(4)
+    size = piece.size(m, change.inertia, axes)
+    radius = piece.radius_of(size)
+    pose[:3, :3], pose[:3, 3] = piece.axes_at(change.place, axes), change.place
+    inertia = pose[:3, :3] @ np.diag(piece.principal(m, size)) @ pose[:3, :3].T
     pi = np.array(pin.Inertia(m, change.place, inertia).toDynamicParameters())
     arm = next((a for a in design.arms if a.body == change.body), None)
     return Counterweight(
         change.body,
-        shape,
-        density,
+        piece.shape,
+        density_of(piece.density),
         size,
         frozen(pose),
         frozen(pi),
@@ -338,25 +274,20 @@ def _deviation(space: Space, b: int, difference: Array) -> Array:
 
 def _arm_size(piece: Piece, arm: Change, radius: float) -> tuple[float, ...]:
     """Return length, width and thickness of an arm [m]."""
-    width = arm_width(piece, radius)
+    width = piece.arm_width(radius)
     return (arm.mass / (density_of(piece.density) * width**2), width, width)
 
 
 def _overhang(design: Design, b: int, place: Array, radius: float) -> float:
     """Return how far a round piece sticks out of its region [m], asked of the points of its rim."""
     assert design.asked is not None
-    given, chain, space = design.asked.given, design.original, design.space
-    own = given.region.get(chain.joints[b]) if isinstance(given.region, Mapping) else given.region
-    L = chain.length
-    shape = resolve(own or Ball(L), chain, b, space.axes[b], planar=space.planar, unit=L)
+    space, L, shape = design.space, design.original.length, design.asked.problem.shape(b)
+    assert shape is not None
     center = np.array(space.axes[b])[:2] @ place if space.planar else place
     off = L * (shape.axes @ (center / L - shape.center))
     away = off / np.linalg.norm(off) if off.any() else np.eye(off.size)[0]
     points = off + radius * np.vstack([_directions(off.size), away, np.eye(off.size), -np.eye(off.size)])
-    semi = L * shape.semi_axes
-    if shape.kind == "box":
-        return max(0.0, float((np.abs(points) - semi).max()))
-    return max(0.0, float((np.linalg.norm(points / semi, axis=1).max() - 1.0) * semi.min()))
+    return shape.overhang(points, L)
 
 
 def _directions(d: int) -> Array:
@@ -368,22 +299,6 @@ def _directions(d: int) -> Array:
     z, turn = 1.0 - (2.0 * k + 1.0) / _RIM, np.pi * (1.0 + np.sqrt(5.0)) * k
     r = np.sqrt(1.0 - z * z)
     return np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
-
-
-def _own_inertia(shape: str, m: float, size: tuple[float, ...]) -> Array:
-    """Return the principal inertias of a flat piece about its mass centre, z along the thickness (3,)."""
-    a, b, t = size
-    if shape == "disc":
-        side = m * (3.0 * (a * a + b * b) + t * t) / 12.0
-        return np.array([side, side, 0.5 * m * (a * a + b * b)])
-    return m / 12.0 * np.array([b * b + t * t, a * a + t * t, a * a + b * b])
-
-
-def _along(place: Array, axes: Array) -> Array:
-    """Return the in-plane direction from the joint to the piece."""
-    flat = place - axes[2] * float(axes[2] @ place)
-    size = float(np.linalg.norm(flat))
-    return np.asarray(flat / size if size > 1e-12 else axes[0])
 
 
 def _frame_of(chain: ClosedChain, joint: str) -> pin.Frame | None:
@@ -408,16 +323,12 @@ def _visuals(chain: ClosedChain, w: Counterweight) -> list[Visual]:
     frame = _frame_of(chain, w.body)
     assert frame is not None
     into = np.asarray(frame.placement.inverse().homogeneous)
-    shape, size = {
-        "ball": ("sphere", w.size),
-        "disc": ("cylinder", (w.size[0], w.size[-1])),
-        "bar": ("box", w.size),
-    }[w.shape]
-    out = [Visual(frame.name, shape, size, into @ w.pose, COLOUR)]
+    kind = SHAPES[w.shape]
+    out = [Visual(frame.name, *kind.visual(w.size), into @ w.pose, COLOUR)]
     if w.arm is not None:
-        x = w.arm.place - w.pose[:3, 2] * float(w.pose[:3, 2] @ w.arm.place) if w.shape != "ball" else w.arm.place
+        x = w.arm.place - w.pose[:3, 2] * float(w.pose[:3, 2] @ w.arm.place) if kind.flat else w.arm.place
         x = x / np.linalg.norm(x)
-        z = w.pose[:3, 2] if w.shape != "ball" else plane_axes(x)[0]
+        z = w.pose[:3, 2] if kind.flat else plane_axes(x)[0]
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = np.column_stack([x, np.cross(z, x), z]), w.arm.place
         out.append(Visual(frame.name, "box", w.arm_size, into @ pose, COLOUR))

@@ -5,54 +5,58 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, figures, settled
+from fivebar_pin.balancing.change import Change
 from fivebar_pin.balancing.conditions import BalanceConditions
-from fivebar_pin.balancing.objectives.term import measure_of
+from fivebar_pin.balancing.objectives.objective import Objective, known
+from fivebar_pin.balancing.objectives.peak import Peak
+from fivebar_pin.balancing.objectives.rms import Rms
 from fivebar_pin.balancing.parameters import Space
 from fivebar_pin.balancing.pieces.piece import Piece
-from fivebar_pin.balancing.regressors.measures import Rows
+from fivebar_pin.balancing.regions.shape import Shape
+from fivebar_pin.balancing.regressors.measures import Measurement
 from fivebar_pin.balancing.solvers import Certificate
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InfeasibleError
 
-if TYPE_CHECKING:
-    from fivebar_pin.balancing.given import Given
-
 PROVED = 1e-5  # gap at which a design counts as optimal [of the objective or its typical size]
-__all__ = ["Certificate", "Change", "Design"]
+__all__ = ["Asked", "Certificate", "Change", "Design", "Problem"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Change(Immutable):
-    """Material added to one body (or removed from it, or the body as redesigned).
+class Problem(Protocol):
+    """What a design answers, as far as a design needs it: `BalanceProblem`."""
 
-    Attributes:
-        body: name of the body's joint.
-        mass: [kg].
-        place: its centre of mass in joint axes (3,) [m]; zero without mass.
-        inertia: about its centre of mass, joint axes (3, 3) [kg m2].
-        parameters: the ten inertial parameters about the joint origin.
-    """
+    @property
+    def density(self) -> tuple[float, float] | None:
+        """How dense the material may be [kg/m3], and its thickness [m]; None for any."""
 
-    body: str
-    mass: float
-    place: Array
-    inertia: Array
-    parameters: Array
+    def solve(
+        self,
+        minimise: Mapping[Objective, float],
+        *,
+        limits: Mapping[Objective, float] | None = None,
+        solver: str | None = None,
+    ) -> Design:
+        """Solve for other weights, or further upper bounds."""
+
+    def in_pieces(self, pieces: Mapping[str, Piece]) -> Problem:
+        """Return the same problem for counterweights of stated kinds."""
+
+    def shape(self, b: int) -> Shape | None:
+        """Return where material added to a body may lie, in chain lengths."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Asked(Immutable):
     """What a design answers: the problem, the weights of its terms, and limits besides those of the problem."""
 
-    given: Given
-    minimise: Mapping[str, float]
-    limits: Mapping[str, float]
+    problem: Problem
+    minimise: Mapping[Objective, float]
+    limits: Mapping[Objective, float]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,7 +77,7 @@ class Design(Immutable):
         terms: value of every term of the objective, in its own unit.
         parameters: inertial parameters of all bodies (nb, 10); nan when infeasible.
         added, removed: material per body that may change; for a redesign, `added` holds the new bodies.
-        rows: the quantities along the given motions, for `before` and `after`.
+        measurement: the quantities along the given motions, for `before` and `after`; None when infeasible.
         certificate: proof of infeasibility, else None; of a design for one branch, the proof that there is none for all
             assembly modes together.
         branch: configuration (nq,) of the branch that the design is for; None when it serves all assembly modes.
@@ -96,7 +100,7 @@ class Design(Immutable):
     parameters: Array
     added: tuple[Change, ...] = ()
     removed: tuple[Change, ...] = ()
-    rows: Mapping[str, Rows] = field(default_factory=dict)
+    measurement: Measurement | None = None
     certificate: Certificate | None = None
     branch: Array | None = None
     alternatives: tuple[Array, ...] = ()
@@ -149,7 +153,7 @@ class Design(Immutable):
     @property
     def material(self) -> str:
         """How dense the material may be, in words; empty where that was not asked."""
-        density = None if self.asked is None else self.asked.given.density
+        density = None if self.asked is None else self.asked.problem.density
         if density is None:
             return ""
         thick = f", {1e3 * density[1]:.4g} mm thick" if self.space.planar else ""
@@ -177,14 +181,27 @@ class Design(Immutable):
         """Return the sum of the sizes of what adds up to a term of the design, see `Loads.scale`; 0 when unknown."""
         return self._scale(term, self.parameters)
 
+    def value(self, term: str, parameters: Array) -> float:
+        """Return a term for bodies of parameters (nb, 10), measured along the motions of this design."""
+        atom, measurement = self._atom(term), self.measurement
+        assert atom is not None and measurement is not None
+        return atom.value(measurement, parameters)
+
     def _scale(self, term: str, pi: Array) -> float:
-        if term == "added_mass":
-            return self.original.mass + float(pi[:, 0].sum())
-        rows = self.rows.get(measure_of(term) or "")
-        return 0.0 if rows is None else rows.scale(term, pi)
+        atom = self._atom(term)
+        return 0.0 if atom is None or self.measurement is None else atom.size(self.measurement, pi)
+
+    def _atom(self, term: str) -> Objective | None:
+        """Return the atom of a name: one of the objective, or one that is known."""
+        minimised = () if self.asked is None else self.asked.minimise
+        return next((atom for atom in minimised if atom.name == term), None) or known().get(term)
 
     def _measured(self, pi: Array) -> dict[str, float]:
-        return {f"{s}_{name}": getattr(rows, s)(pi) for name, rows in self.rows.items() for s in ("rms", "peak")}
+        measurement = self.measurement
+        if measurement is None:
+            return {}
+        atoms = [atom for name in measurement.rows for atom in (Rms(name), Peak(name))]
+        return {atom.name: atom.value(measurement, pi) for atom in atoms}
 
     @cached_property
     def residual(self) -> float:
@@ -210,11 +227,3 @@ class Design(Immutable):
                 f"{self.original.name} cannot be balanced ({self.kind}) within the bounds: {self.certificate}"
             )
         return self.original.with_inertial_parameters(self.parameters)
-
-
-def change_of(body: str, pi: Array) -> Change:
-    """Describe ten inertial parameters as a body."""
-    if pi[0] <= 0.0:
-        return Change(body, float(pi[0]), np.zeros(3), np.zeros((3, 3)), pi)
-    inertia = pin.Inertia.FromDynamicParameters(pi)
-    return Change(body, float(pi[0]), np.array(inertia.lever), np.array(inertia.inertia), pi)

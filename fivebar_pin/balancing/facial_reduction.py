@@ -20,32 +20,34 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.balancing.solvers.cones import outside
-from fivebar_pin.balancing.variables.material import Material
+from fivebar_pin.balancing.variables.part import Placed
 
 __all__ = ["empty", "without"]
 
 _ZERO = 1e-9  # coefficient of a condition that counts as none [scaled, rows of unit size]
+_HELD = 0.5  # w at a vertex is 0 or 1; this tells which [-]
 _ROUND_OFF = 1e-13  # what is left of a condition that says nothing any more [of its largest coefficient]
 
 
-def empty(blocks: Sequence[Block], materials: Sequence[Material], n: int) -> tuple[bool, ...]:
-    """Return for each material whether the constraints leave none of it."""
-    masses = [m.start for m in materials]
+def empty(blocks: Sequence[Block], parts: Sequence[Placed], n: int) -> tuple[bool, ...]:
+    """Return for each part whether the constraints leave none of it."""
+    masses = [p.apex for p in parts if p.apex is not None]
     rest = np.setdiff1d(np.arange(n), masses)
     equal, least = _stacked(blocks, "zero", n), _stacked(blocks, "nonneg", n)
     least = least[np.abs(least[:, rest]).max(axis=1, initial=0.0) == 0.0]
     basis = _kernel(np.column_stack([equal[:, rest], equal[:, -1]]).T)  # lambda with none but masses, and no constant
     rows = np.concatenate([basis.T @ equal[:, masses], least[:, masses]])
     if not np.abs(rows).max(initial=0.0) > _ZERO:
-        return (False,) * len(materials)
-    return _vanishing(rows, least[:, -1], basis.shape[1])
+        return (False,) * len(parts)
+    gone = iter(_vanishing(rows, least[:, -1], basis.shape[1]))
+    return tuple(p.apex is not None and next(gone) for p in parts)
 
 
-def without(blocks: Sequence[Block], materials: Sequence[Material], gone: Sequence[bool], n: int) -> list[Block]:
-    """Return the constraints with the material that is `gone` set to zero and taken out of all other rows."""
+def without(blocks: Sequence[Block], parts: Sequence[Placed], gone: Sequence[bool], n: int) -> list[Block]:
+    """Return the constraints with the parts that are `gone` set to zero and taken out of all other rows."""
     if not any(gone):
         return list(blocks)
-    columns = np.concatenate([np.arange(m.start, m.start + m.size) for m, g in zip(materials, gone, strict=True) if g])
+    columns = np.concatenate([np.arange(n)[p.where] for p, g in zip(parts, gone, strict=True) if g])
     out = [Block("bodies that the conditions leave empty", "zero", np.eye(n)[columns], np.zeros(columns.size))]
     for block in blocks:
         G = block.G.copy()
@@ -85,7 +87,7 @@ def _vanishing(rows: Array, constants: Array, free: int) -> tuple[bool, ...]:
     cost = np.concatenate([np.zeros(k), -np.ones(count)])
     found = linprog(cost, A_ub=A, b_ub=np.zeros(count), A_eq=total, b_eq=[0.0], bounds=bounds)
     held = np.zeros(count) if found.x is None else np.asarray(found.x, dtype=np.float64)[k:]
-    return tuple(bool(w > 0.5) for w in held)
+    return tuple(bool(w > _HELD) for w in held)
 
 
 def _kept_rows(block: Block, G: Array) -> list[Block]:

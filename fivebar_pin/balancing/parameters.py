@@ -144,3 +144,11 @@ def plane_axes(n: Array) -> Array:
     e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
     e1 /= np.linalg.norm(e1)
     return frozen([e1, np.cross(n, e1), n])
+
+
+def lowest_eigenvalue(x: Array, *, planar: bool) -> float:
+    """Return the smallest eigenvalue of the pseudo-inertia of one body (4,) or (10,)."""
+    if planar:
+        h = float(np.hypot(x[1], x[2]))
+        return float(np.linalg.eigvalsh(np.array([[x[3], h], [h, x[0]]]))[0])
+    return float(np.linalg.eigvalsh(pseudo_inertia(x))[0])

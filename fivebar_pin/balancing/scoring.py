@@ -14,14 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked, figures, finite, frozen, reals
-from fivebar_pin.balancing.objectives.term import LINEAR, TERMS, base, check_terms, measure_of
-from fivebar_pin.balancing.regressors.measures import Motions, Rows, measure, reflected_inertia, trajectories
+from fivebar_pin.balancing.objectives.objective import Objective, known, named
+from fivebar_pin.balancing.regressors.measures import Measurement, Motions, measure, trajectories
+from fivebar_pin.balancing.regressors.rows import Rows
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Scores", "score"]
 
+_PHYSICAL = 1e-9  # invariant of the second moments about a mass centre that counts as zero [of their size]
+_TINY = 1e-300  # divides what has no size at all
 _NOISE = 1e-15  # singular values of a factor below this share of the largest are round-off [-]
 _PEAK_VALUES = 2_000_000  # intermediate values per block when peaks are wanted
 _BLOCK = 8192
@@ -62,7 +64,7 @@ def score(
     motions: Motions,
     designs: npt.ArrayLike,
     *,
-    terms: Sequence[str] = ("rms_shaking_force", "rms_shaking_moment", "rms_torque"),
+    terms: Sequence[str | Objective] = ("rms_shaking_force", "rms_shaking_moment", "rms_torque"),
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     near: npt.ArrayLike | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -84,32 +86,33 @@ def score(
         UnknownNameError: a term that does not exist.
         InvalidInputError: designs of the wrong shape, not finite, or not physical (which one).
     """
-    wanted = (terms,) if isinstance(terms, str) else tuple(terms)
-    check_terms(wanted, "term")
-    if "distance" in wanted or not wanted:
-        raise InvalidInputError("terms", wanted, f"must be some of {[t for t in TERMS if t != 'distance']}")
+    given = (terms,) if isinstance(terms, (str, Objective)) else tuple(terms)
+    atoms = tuple(dict.fromkeys(named(term, "term") for term in given))
+    if not atoms or any(atom.distance for atom in atoms):
+        possible = [name for name, atom in known().items() if not atom.distance]
+        raise InvalidInputError("terms", [atom.name for atom in atoms], f"must be some of {possible}")
     X = _designs(chain, designs)
     point = checked("about", about, (3,))
     paths = trajectories(chain, motions, near)
-    names = dict.fromkeys(m for m in map(measure_of, wanted) if m is not None)
-    rows = {m: measure(chain, paths, m, about=point) for m in names}
-    factors = _factors({base(t): rows[m] for t in wanted if (m := measure_of(t)) and not t.startswith("peak")}, chain)
-    linear = {t: _linear(chain, paths, t) for t in wanted if t in LINEAR}
-    peaks = {t: rows[m] for t in wanted if t.startswith("peak") and (m := measure_of(t))}
-    out = {t: np.empty(len(X)) for t in wanted}
+    names = dict.fromkeys(atom.quantity for atom in atoms if atom.quantity is not None)
+    measurement = Measurement(chain, None, paths, {m: measure(chain, paths, m, about=point) for m in names})
+    found = {atom.root: rows for atom in atoms if (rows := atom.rms_rows(measurement)) is not None}
+    factors = _factors(found, chain)
+    whole = [measurement.rows[a.quantity] for a in atoms if a.quantity is not None and a.root not in found]
     block = _BLOCK
-    if peaks:
-        block = max(1, min(block, _PEAK_VALUES // max(r.F.shape[0] * r.F.shape[1] for r in peaks.values())))
+    if whole:
+        block = max(1, min(block, _PEAK_VALUES // max(r.F.shape[0] * r.F.shape[1] for r in whole)))
+    out = {atom: np.empty(len(X)) for atom in atoms}
     for start in range(0, len(X), block):
         part = slice(start, min(start + block, len(X)))
         _require_physical(X[part], start, chain)
-        _fill(out, part, X[part].reshape(part.stop - start, -1), factors, linear, peaks)
+        _fill(out, part, X[part].reshape(part.stop - start, -1), factors, measurement)
         if progress is not None:
             progress(part.stop, len(X))
     largest = np.abs(X).max(axis=0, initial=0.0)
-    scales = {t: rows[m].scale(t, largest) for t in wanted if (m := measure_of(t))}
-    scales |= {t: chain.mass + float(largest[:, 0].sum()) if t == "added_mass" else 0.0 for t in linear}
-    return Scores(MappingProxyType({t: frozen(x) for t, x in out.items()}), MappingProxyType(scales))
+    scales = {atom.name: atom.size(measurement, largest) for atom in atoms}
+    values = MappingProxyType({atom.name: frozen(x) for atom, x in out.items()})
+    return Scores(values, MappingProxyType(scales))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,57 +122,39 @@ class _Factors:
     columns: npt.NDArray[np.intp]
     W: Array  # (columns, r)
     w: Array  # (r,)
-    parts: dict[str, slice]
+    parts: dict[Objective, slice]
 
 
-def _factors(rows: dict[str, Rows], chain: ClosedChain) -> _Factors:
+def _factors(rows: dict[Objective, Rows], chain: ClosedChain) -> _Factors:
     scale = np.tile(chain.length ** np.array([0.0] + [1.0] * 3 + [2.0] * 6), len(chain.joints))
     found, parts, done = [np.zeros((0, scale.size + 1))], {}, 0
-    for name, row in rows.items():
+    for root, row in rows.items():
         stacked = np.concatenate([row.F * scale, row.f[..., None]], axis=2).reshape(-1, scale.size + 1)
         R = np.asarray(np.linalg.qr(stacked / np.sqrt(len(row.F)), mode="r"))
         _, s, Vt = np.linalg.svd(R, full_matrices=False)
-        keep = s > _NOISE * max(float(s[0]) if s.size else 0.0, 1e-300)
+        keep = s > _NOISE * max(float(s[0]) if s.size else 0.0, _TINY)
         W = s[keep, None] * Vt[keep]
         W[np.abs(W) < _NOISE * np.abs(W).max(initial=0.0)] = 0.0
         found.append(W)
-        parts[name] = slice(done, done + len(W))
+        parts[root] = slice(done, done + len(W))
         done += len(W)
     both = np.concatenate(found)
     columns = np.flatnonzero(np.any(both[:, :-1], axis=0))
     return _Factors(columns, np.ascontiguousarray((both[:, columns] / scale[columns]).T), both[:, -1], parts)
 
 
-def _linear(chain: ClosedChain, paths: Sequence[Trajectory], term: str) -> tuple[Array, float]:
-    weight = np.zeros(10 * len(chain.joints))
-    weight[::10] = 1.0
-    if term == "added_mass":
-        return weight, -chain.mass
-    return reflected_inertia(chain, paths), 0.0
-
-
-def _fill(
-    out: dict[str, Array],
-    part: slice,
-    x: Array,
-    factors: _Factors,
-    linear: dict[str, tuple[Array, float]],
-    peaks: dict[str, Rows],
-) -> None:
-    squares: dict[str, Array] = {}
+def _fill(out: dict[Objective, Array], part: slice, x: Array, factors: _Factors, measurement: Measurement) -> None:
+    squares: dict[Objective, Array] = {}
     if factors.parts:
         y = _product(x.take(factors.columns, axis=1), factors.W)
         y += factors.w
-        squares = {name: np.einsum("kr,kr->k", y[:, s], y[:, s]) for name, s in factors.parts.items()}
-    for term, values in out.items():
-        if term in linear:
-            weight, constant = linear[term]
-            values[part] = x @ weight + constant
-        elif term in peaks:
-            values[part] = _peak(peaks[term], x)
+        squares = {root: np.einsum("kr,kr->k", y[:, s], y[:, s]) for root, s in factors.parts.items()}
+    for atom, values in out.items():
+        if atom.root in squares:
+            square = squares[atom.root]
+            values[part] = square if atom.squared else np.sqrt(square)
         else:
-            square = squares[base(term)]
-            values[part] = square if term.startswith("mean_square_") else np.sqrt(square)
+            values[part] = atom.values(measurement, x)
 
 
 def _product(x: Array, W: Array) -> Array:
@@ -188,14 +173,6 @@ def _product(x: Array, W: Array) -> Array:
     return out
 
 
-def _peak(rows: Rows, x: Array) -> Array:
-    n, r, P = rows.F.shape
-    values = (x @ rows.F.reshape(n * r, P).T + rows.f.reshape(-1)).reshape(len(x), n, r)
-    values *= values
-    lengths = [values[:, :, g].sum(axis=2).max(axis=1) for g in rows.groups]
-    return np.asarray(np.sqrt(np.max(lengths, axis=0))) if lengths else np.zeros(len(x))
-
-
 def _designs(chain: ClosedChain, designs: npt.ArrayLike) -> Array:
     X = reals("designs", designs)
     nb = len(chain.joints)
@@ -205,7 +182,7 @@ def _designs(chain: ClosedChain, designs: npt.ArrayLike) -> Array:
     return X
 
 
-def _require_physical(X: Array, start: int, chain: ClosedChain, tolerance: float = 1e-9) -> None:
+def _require_physical(X: Array, start: int, chain: ClosedChain, tolerance: float = _PHYSICAL) -> None:
     """Raise for a body whose second moments about its mass centre are not positive semidefinite.
 
     A symmetric matrix is so when its three invariants are not negative.

@@ -26,6 +26,8 @@ from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.springs import JointSpring, Spring
 
+__all__ = ["held", "required_gravity", "same_springs", "spring_rows", "springs_act"]
+
 _ROUND_OFF = 1e-9  # share of the power of all joints' spring torques that is round-off in their sum [-]
 _ALIKE = 1e-9  # difference up to which placements of frames are the same [m, -]
 

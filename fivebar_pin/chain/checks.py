@@ -29,7 +29,7 @@ def check_tree(model: pin.Model) -> None:
             "mimic joints",
             mimics,
             "cannot be part of a chain: the bodies they move would be left out",
-            "Build the model without mimic: buildModelFromUrdf reads them as joints of their own.",
+            "Build the model without mimic: buildModelFromUrdf makes them joints of their own; a Coupling ties them.",
         )
     _check_losses(model)
 

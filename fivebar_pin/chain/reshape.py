@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
@@ -27,14 +29,20 @@ def put_in_place(model: pin.Model, geometry: Geometry) -> None:
         UnknownNameError: a joint or frame of a placement or body that the model does not have.
         InvalidInputError: the model has it somewhere else, or a body with frames on several links.
     """
+    if not geometry.placements and not geometry.bodies:
+        return
+    frames = frames_by_name(model)
     for name, pose in geometry.poses().items():
-        away = np.abs(np.array(_placed(model, name).homogeneous) - np.array(pose.homogeneous)).max()
+        j = _joint_of(model, name)
+        if not j and name not in frames:
+            raise UnknownNameError("joint or frame of a placement", name, [*list(model.names)[1:], *frames])
+        placed = model.jointPlacements[j] if j else frames[name].placement
+        away = np.abs(np.array(placed.homogeneous) - np.array(pose.homogeneous)).max()
         if away > _SAME:
             raise InvalidInputError(
                 f"placement of {name}", float(away), "lies that far from where the parameters put it [m, -]"
             )
     _put(model, geometry)
-    frames = frames_by_name(model) if geometry.bodies else {}
     for body in geometry.bodies:
         for frame in body.frames:
             if frame not in frames:
@@ -47,51 +55,82 @@ def reshaped(model: pin.Model, visuals: Iterable[Visual], geometry: Geometry) ->
     """Return the model and visuals of a chain as they are with another geometry."""
     moved = model.copy()
     _put(moved, geometry)
-    _follow_bodies(model, moved, geometry.bodies)
-    return moved, tuple(_follow_visuals(model, moved, visuals, geometry.bodies))
+    there, then = frames_by_name(model), frames_by_name(moved)
+    bodies = tuple(_moved_bodies(there, then, geometry.bodies))
+    _follow_bodies(model, moved, bodies)
+    return moved, tuple(_follow_visuals(visuals, there, then, bodies))
 
 
 def with_bodies(model: pin.Model, bodies: Iterable[Body]) -> pin.Model:
     """Return the model with each link that a rule is about made of what the rules say and nothing else."""
     model = model.copy()
-    for j, rules in _by_joint(model, bodies).items():
-        model.inertias[j] = _total(model, rules)
+    frames = frames_by_name(model)
+    for j, found in _by_joint(_moved_bodies(frames, frames, bodies)).items():
+        model.inertias[j] = _total(body.rule.inertia(body.now) for body in found)
     return model
 
 
-def _follow_bodies(before: pin.Model, after: pin.Model, bodies: Iterable[Body]) -> None:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    """A rule about a moving link: its joint, and the poses of its frames (k, 4, 4) before and after."""
+
+    rule: Body
+    joint: int
+    was: Array
+    now: Array
+
+
+def _moved_bodies(
+    there: Mapping[str, pin.Frame], then: Mapping[str, pin.Frame], bodies: Iterable[Body]
+) -> Iterator[_Body]:
+    for rule in bodies:
+        joint = int(then[rule.frames[0]].parentJoint)
+        if joint:
+            was, now = (
+                np.stack([np.array(frames[name].placement.homogeneous) for name in rule.frames])
+                for frames in (there, then)
+            )
+            yield _Body(rule, joint, was, now)
+
+
+def _by_joint(bodies: Iterable[_Body]) -> dict[int, list[_Body]]:
+    found: dict[int, list[_Body]] = {}
+    for body in bodies:
+        found.setdefault(body.joint, []).append(body)
+    return found
+
+
+def _follow_bodies(before: pin.Model, after: pin.Model, bodies: Iterable[_Body]) -> None:
     """Give the links whose frames have moved their new inertia, in place.
 
     What a link has beyond its rules (a counterweight, say) stays where it is in the axes of its joint.
     """
-    for j, rules in _by_joint(after, bodies).items():
-        if all(np.array_equal(_poses(before, r), _poses(after, r)) for r in rules):
+    for j, found in _by_joint(bodies).items():
+        if all(np.array_equal(body.was, body.now) for body in found):
             continue
-        old, new, present = _total(before, rules), _total(after, rules), before.inertias[j]
+        old = _total(body.rule.inertia(body.was) for body in found)
+        new = _total(body.rule.inertia(body.now) for body in found)
+        present = before.inertias[j]
         if present == old:
             after.inertias[j] = new
             continue
         pi = present.toDynamicParameters() + new.toDynamicParameters() - old.toDynamicParameters()
-        name = after.names[j]
         if not pi[0] > 0.0:
-            raise InvalidInputError(
-                f"mass of the body of joint {name}", float(pi[0]), "must stay positive [kg]", "Cut off less."
-            )
+            name = f"mass of the body of joint {after.names[j]}"
+            raise InvalidInputError(name, float(pi[0]), "must stay positive [kg]", "Cut off less.")
         after.inertias[j] = pin.Inertia.FromDynamicParameters(pi)
 
 
 def _follow_visuals(
-    before: pin.Model, after: pin.Model, visuals: Iterable[Visual], bodies: Iterable[Body]
-) -> Iterable[Visual]:
+    visuals: Iterable[Visual], there: Mapping[str, pin.Frame], then: Mapping[str, pin.Frame], bodies: Iterable[_Body]
+) -> Iterator[Visual]:
     """Yield the visuals; those that show a body of a rule as it was show it as it is now."""
     boxes = [
-        (j, was, now)
-        for j, rules in _by_joint(after, bodies).items()
-        for rule in rules
-        for was, now in zip(rule.drawn(_poses(before, rule)), rule.drawn(_poses(after, rule)), strict=True)
-        if was[0] != now[0] or not np.array_equal(was[1], now[1])
+        (body.joint, was, now)
+        for body in bodies
+        if not np.array_equal(body.was, body.now)
+        for was, now in zip(body.rule.drawn(body.was), body.rule.drawn(body.now), strict=True)
     ]
-    there, then = frames_by_name(before), frames_by_name(after)
     for visual in visuals:
         frame = there[visual.frame]
         pose = np.array(frame.placement.homogeneous) @ visual.placement
@@ -104,8 +143,8 @@ def _follow_visuals(
             yield visual
 
 
-def _near(one: object, other: object) -> bool:
-    return bool(np.allclose(np.asarray(one), np.asarray(other), rtol=0.0, atol=_SAME))
+def _near(one: npt.ArrayLike, other: npt.ArrayLike) -> bool:
+    return bool(np.abs(np.asarray(one) - np.asarray(other)).max() <= _SAME)
 
 
 def _joint_of(model: pin.Model, name: str) -> int:
@@ -113,19 +152,10 @@ def _joint_of(model: pin.Model, name: str) -> int:
     return int(model.getJointId(name)) if model.existJointName(name) else 0
 
 
-def _placed(model: pin.Model, name: str) -> pin.SE3:
-    j = _joint_of(model, name)
-    if j:
-        return model.jointPlacements[j]
-    frames = frames_by_name(model)
-    if name not in frames:
-        raise UnknownNameError("joint or frame of a placement", name, [*list(model.names)[1:], *frames])
-    return frames[name].placement
-
-
 def _put(model: pin.Model, geometry: Geometry) -> None:
     poses = geometry.poses()
-    ids = dict(_ids(model, poses.__contains__))
+    meant = frames_by_name(model)
+    ids = {f.name: k for k, f in enumerate(model.frames) if f.name in poses and f.type == meant[f.name].type}
     for name, pose in poses.items():
         j = _joint_of(model, name)
         if j:
@@ -138,32 +168,8 @@ def _put(model: pin.Model, geometry: Geometry) -> None:
             joint.placement = pose
 
 
-def _ids(model: pin.Model, wanted: Callable[[str], bool]) -> Iterable[tuple[str, int]]:
-    """Yield name and index of the frames that `frames_by_name` means."""
-    meant = frames_by_name(model)
-    for k, frame in enumerate(model.frames):
-        if wanted(frame.name) and frame.type == meant[frame.name].type:
-            yield frame.name, k
-
-
-def _by_joint(model: pin.Model, bodies: Iterable[Body]) -> dict[int, list[Body]]:
-    """Return the rules of every moving link."""
-    frames, found = frames_by_name(model), dict[int, list[Body]]()
-    for body in bodies:
-        j = int(frames[body.frames[0]].parentJoint)
-        if j:
-            found.setdefault(j, []).append(body)
-    return found
-
-
-def _poses(model: pin.Model, body: Body) -> Array:
-    frames = frames_by_name(model)
-    return np.stack([np.array(frames[name].placement.homogeneous) for name in body.frames])
-
-
-def _total(model: pin.Model, rules: Iterable[Body]) -> pin.Inertia:
+def _total(parts: Iterable[pin.Inertia]) -> pin.Inertia:
     total = None
-    for rule in rules:
-        part = rule.inertia(_poses(model, rule))
+    for part in parts:
         total = part if total is None else total + part
     return total

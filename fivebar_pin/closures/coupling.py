@@ -19,7 +19,7 @@ from fivebar_pin.errors import InvalidInputError, UnknownNameError
 __all__ = ["Coupling"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Coupling(Closure, word="coupling"):
     """Coordinates of joints tied to each other, sum_k c_k q_k = offset. One row.
 
@@ -63,6 +63,9 @@ class Coupling(Closure, word="coupling"):
             if c == 0.0:
                 raise InvalidInputError(f"ratio of joint {name}", c, "must not be zero", "Leave the joint out.")
         self._settle(ratios=MappingProxyType(ratios), offset=number("offset of a coupling", self.offset))
+
+    def __repr__(self) -> str:
+        return f"Coupling({dict(self.ratios)}, {self.offset}, name={self.name!r})"
 
     @property
     def joins(self) -> tuple[str, ...]:
@@ -117,10 +120,10 @@ class Coupling(Closure, word="coupling"):
         if len(set(joints)) != len(joints):
             raise InvalidInputError("joints of a coupling", joints, "must differ", "Add the ratios of one joint.")
         ratio = values.get("ratio")
-        given = [] if ratio is None else list(np.atleast_1d(ratio))
+        given: list[Any] = list(ratio) if isinstance(ratio, Iterable) and not isinstance(ratio, str) else [ratio]
         if len(given) != len(joints):
             raise InvalidInputError(
-                "ratio of a coupling", given, f"must hold {len(joints)} numbers, one for each joint"
+                "ratio of a coupling", ratio, f"must hold {len(joints)} numbers, one for each joint"
             )
         return cls(dict(zip(joints, given, strict=True)), values.get("offset", 0.0), name=name)
 

@@ -22,7 +22,9 @@ __all__ = ["Distance"]
 
 @dataclass(frozen=True, eq=False)
 class Distance(FrameClosure, word="distance"):
-    """A rod without mass, with a ball at either end. One row [m]; its multiplier is the force that stretches it [N].
+    """A rod without mass, with a ball at either end. One row [m].
+
+    Its multiplier is the force with which the rod pushes its ends apart; where it is negative, the rod pulls [N].
 
     Where the points coincide the rod has no direction. No closed configuration lies there, because the length is
     positive; a search that starts there takes the x axis of frame 1 for it.

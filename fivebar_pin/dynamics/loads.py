@@ -113,7 +113,8 @@ class Loads(Immutable):
         """Forces in the rows of every closure by its name (n, rows); nan where redundant rows leave them open.
 
         Of a coupling sum_k c_k q_k = offset it is what is transmitted: it acts with the torque c_k lambda in joint k
-        [N m or N, divided by the unit of c_k]. Of a distance it is the force that stretches the rod [N].
+        [N m or N, divided by the unit of c_k]. Of a distance it is the force with which the rod pushes
+        its ends apart [N].
         """
         r = self.reactions
         values = np.where(r.determinate_rows, r.multipliers, np.nan)

@@ -155,8 +155,11 @@ class _Builder:
             self.body(joint.child, parent, placement, self.pin.addFrame(fixed))
             return
         if joint.mimic:
-            problem = "<mimic> is not supported; remove it to leave the joint free, or make the joint FIXED under"
-            raise FileFormatError(self.urdf, f"joint {joint.name!r}: {problem} joint_name / joint_type in the sidecar")
+            problem = (
+                "<mimic> is not supported; remove it to leave the joint free, tie the joints by a closure of type "
+                "coupling in the sidecar, or make the joint FIXED there under joint_name / joint_type"
+            )
+            raise FileFormatError(self.urdf, f"joint {joint.name!r}: {problem}")
         inertia = self.tree.links[joint.child].inertia
         if inertia is not None and inertia.mass == 0.0:
             problem = f"link {joint.child!r}: mass = 0 on a moving link; give it a mass, or leave <inertial> out"

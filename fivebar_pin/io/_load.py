@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy.typing as npt
@@ -15,7 +16,7 @@ from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
-from fivebar_pin.io._entries import TreeEntry
+from fivebar_pin.io._entries import UNLIMITED, TreeEntry
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
 from fivebar_pin.io._urdf import read_urdf
@@ -157,6 +158,7 @@ def _load_urdf(
         )
     sidecar = Sidecar() if beside is None else read_sidecar(beside)
     note = beside or urdf
+    tree = _counting(tree, sidecar.closures if closures is None else closures)
     model = build_model(tree, sidecar, free_flyer=free_flyer, urdf=urdf, beside=note)
     if closures is None:
         check_closures(model, sidecar.closures, note, "closed_loop")
@@ -174,6 +176,16 @@ def _load_urdf(
         springs=sidecar.springs,
         geometry=sidecar.geometry,
     )
+
+
+def _counting(tree: TreeEntry, closures: tuple[Closure, ...]) -> TreeEntry:
+    """Return the tree with the continuous joints of couplings counting their turns: revolute, without limits."""
+    joints = dict(tree.joints)
+    for name in {name for closure in closures for name in closure.counted}:
+        if name in joints and joints[name].kind == "continuous":
+            data = {**joints[name].data, "lower": [-UNLIMITED], "upper": [UNLIMITED]}
+            joints[name] = replace(joints[name], kind="revolute", data=data)
+    return replace(tree, joints=joints)
 
 
 def make_chain(

@@ -7,7 +7,9 @@ MuJoCo's tendon pulls with k (L - l) + c dL/dt and its joint with -k (q - rest) 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pinocchio as pin
@@ -16,9 +18,10 @@ from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.errors import FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._mjcf_reader import MjcfReader
 from fivebar_pin.io._mjcf_tree import BodyTree
+from fivebar_pin.io._urdf_text import numbers
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["joint_springs_to_write", "tendon_springs"]
+__all__ = ["joint_springs_to_write", "tendon_lines", "tendon_springs"]
 
 _AUTOMATIC = -1.0
 """MuJoCo's springlength for the length where the springs of all joints are relaxed."""
@@ -66,6 +69,19 @@ def joint_springs_to_write(chain: ClosedChain) -> dict[str, JointSpring]:
             rule = "has no word in MJCF, whose hinges count their turns"
             raise InvalidInputError(f"spring on joint {joint}", "continuous", rule, _URDF_ONLY)
     return {s.joint: s for s in springs}
+
+
+def tendon_lines(chain: ClosedChain, site: Callable[[str], str]) -> list[str]:
+    """Return the tendons that the chain's springs between frames are; `site` makes a site of a frame."""
+    lines = []
+    for spring in chain.springs:
+        if isinstance(spring, Spring):
+            words = f'stiffness="{numbers([spring.stiffness])}" springlength="{numbers([spring.length])}"'
+            if spring.damping:
+                words += f' damping="{numbers([spring.damping])}"'
+            ends = "".join(f"<site site={quoteattr(site(f))}/>" for f in (spring.frame1, spring.frame2))
+            lines.append(f"    <spatial {words}>{ends}</spatial>")
+    return lines
 
 
 def _check_spring_alone(reader: MjcfReader, full: ElementTree.Element, where: str) -> None:

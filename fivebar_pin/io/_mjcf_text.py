@@ -18,11 +18,10 @@ from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
 from fivebar_pin.io._mjcf import ORDER, UNBOUNDED
-from fivebar_pin.io._mjcf_springs import joint_springs_to_write
+from fivebar_pin.io._mjcf_springs import joint_springs_to_write, tendon_lines
 from fivebar_pin.io._mjcf_words import equality_lines
 from fivebar_pin.io._outline import outline
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
-from fivebar_pin.springs import Spring
 
 __all__ = ["mjcf_text"]
 
@@ -59,7 +58,7 @@ class _Writer:
 
     def text(self) -> str:
         equality = [line for closure in self.chain.closures for line in equality_lines(self, closure)]
-        self.add_springs()
+        self.tendons += tendon_lines(self.chain, self.site)
         bodies = self.contents(self.tree.root, "    ")
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
@@ -164,16 +163,6 @@ class _Writer:
         if abs(low) < _LIMITLESS and abs(high) < _LIMITLESS and (low, high) != (0.0, 0.0):
             words.append(f'actuatorfrcrange="{numbers([low, high])}"')
         return words
-
-    def add_springs(self) -> None:
-        """Add the springs between frames to the tendons."""
-        for spring in self.chain.springs:
-            if isinstance(spring, Spring):
-                words = f'stiffness="{numbers([spring.stiffness])}" springlength="{numbers([spring.length])}"'
-                if spring.damping:
-                    words += f' damping="{numbers([spring.damping])}"'
-                ends = "".join(f"<site site={quoteattr(self.site(f))}/>" for f in (spring.frame1, spring.frame2))
-                self.tendons.append(f"    <spatial {words}>{ends}</spatial>")
 
     def pose(self, frame: str) -> tuple[str, Array]:
         """Return the link of the body that carries a frame, and the frame's pose there."""

@@ -12,9 +12,9 @@ import pinocchio as pin
 from fivebar_pin.chain import BarBody, ClosedChain, Geometry, LumpBody, Placement, PlateBody, Visual
 from fivebar_pin.chain.bodies import Body
 from fivebar_pin.chain.reshape import with_bodies
-from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.closures import Closure, Coupling
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.planar._parts import GROUND, Link, Lump, Motor, PointSpring
+from fivebar_pin.planar._parts import GROUND, Gear, Link, Lump, Motor, PointSpring
 from fivebar_pin.planar._shape import Moves, Shape, back, link_poses
 from fivebar_pin.planar._tree import Edge, Tree, block_of, spanning_tree
 from fivebar_pin.springs import Spring
@@ -43,6 +43,7 @@ def built(
     links: Mapping[str, Link],
     *,
     motors: Sequence[Motor],
+    gears: Iterable[Gear],
     lumps: Iterable[Lump],
     springs: Iterable[PointSpring],
     gravity: Sequence[float],
@@ -54,12 +55,13 @@ def built(
         sketch: where every point lies, x + i y [m].
         links: by name, the ground among them.
         motors: with the point and the other link of each filled in.
+        gears: between links.
         lumps: masses on links.
         springs: between points.
         gravity: (3,) [m/s2].
     """
     tree = spanning_tree(name, links, motors)
-    return _Builder(name, sketch, links, tree).chain(motors, tuple(lumps), springs, gravity)
+    return _Builder(name, sketch, links, tree).chain(motors, gears, tuple(lumps), springs, gravity)
 
 
 class _Builder:
@@ -76,7 +78,12 @@ class _Builder:
         self.model.addBodyFrame(GROUND, 0, pin.SE3.Identity(), 0)
 
     def chain(
-        self, motors: Sequence[Motor], lumps: Sequence[Lump], springs: Iterable[PointSpring], gravity: Sequence[float]
+        self,
+        motors: Sequence[Motor],
+        gears: Iterable[Gear],
+        lumps: Sequence[Lump],
+        springs: Iterable[PointSpring],
+        gravity: Sequence[float],
     ) -> ClosedChain:
         for edge in self.tree.edges:
             self.joint(edge)
@@ -91,7 +98,7 @@ class _Builder:
         model.referenceConfigurations[HOME] = np.array(self.home)
         return ClosedChain(
             model,
-            tuple(self.closures()),
+            (*self.closures(), *(self.coupling(gear) for gear in gears)),
             tuple(self.driven(m) for m in motors),
             visuals=tuple(self.visuals(model, geometry.bodies)),
             springs=tuple(self.spring(s) for s in springs),
@@ -154,11 +161,38 @@ class _Builder:
         for cut in self.tree.cuts:
             if not cut.at:
                 end = frame_of(cut.second, self.links[cut.second].points[0])
-                yield Closure((f"{block_of(cut.second)}_link", end), ClosureKind.WELD, name=cut.second)
+                yield Closure((f"{block_of(cut.second)}_link", end), "6d", name=cut.second)
                 continue
             met[cut.at] = met.get(cut.at, 0) + 1
             name = cut.at if met[cut.at] == 1 else f"{cut.at}_{met[cut.at]}"
             yield Closure((frame_of(cut.first, cut.at), frame_of(cut.second, cut.at)), name=name)
+
+    def coupling(self, gear: Gear) -> Coupling:
+        """Return the coupling of a gear; it meshes as the links lie in the sketch.
+
+        The angle of a link is the sum of the coordinates of the hinges that lead to it, so that for angles counted on
+        the carrier: driven - carrier = ratio (driver - carrier) + constant.
+        """
+        ratios: dict[str, float] = {}
+        for link, factor in ((gear.driven, 1.0), (gear.driver, -gear.ratio), (gear.carrier, gear.ratio - 1.0)):
+            for joint in self.hinges(link):
+                ratios[joint] = ratios.get(joint, 0.0) + factor
+        ratios = {joint: c for joint, c in ratios.items() if c}
+        name = f"{gear.driver}_{gear.driven}"
+        if not ratios:
+            raise InvalidInputError(f"gear {name}", gear.ratio, "ties nothing: both turn alike as it is")
+        at = dict(zip(list(self.model.names)[1:], self.home, strict=True))
+        return Coupling(ratios, sum(c * at[joint] for joint, c in ratios.items()), name=name)
+
+    def hinges(self, link: str) -> list[str]:
+        """Return the hinges from the ground to a link."""
+        above = {e.child: e for e in self.tree.edges}
+        found = []
+        while link in above:
+            if above[link].at:
+                found.append(link)
+            link = above[link].parent
+        return found
 
     def driven(self, motor: Motor) -> str:
         """Return the joint that a motor drives."""
@@ -199,6 +233,9 @@ class _Builder:
     def spring(self, spring: PointSpring) -> Spring:
         """Return a spring between links that are not the same one."""
         one, other = ([x.name for x in self.links.values() if point in x.points] for point in spring.ends)
+        for point, links in zip(spring.ends, (one, other), strict=True):
+            if not links:
+                raise InvalidInputError(f"point {point} of a spring", spring.ends, "must belong to a bar or the ground")
         pairs = [(a, b) for a in one for b in other if a != b]
         if not pairs:
             raise InvalidInputError(

@@ -16,7 +16,7 @@ from fivebar_pin.planar.linkage import Linkage
 
 __all__ = ["is_linkage_file", "load"]
 
-_KEYS = ("linkage", "gravity", "points", "ground", "bars", "plates", "slides", "masses", "springs", "motors")
+_KEYS = ("linkage", "gravity", "points", "ground", "bars", "plates", "slides", "masses", "springs", "gears", "motors")
 _MOTOR = re.compile(r"(?P<link>\S+)(\s+at\s+(?P<at>\S+))?(\s+on\s+(?P<on>\S+))?")
 _DEGREES = re.compile(r"(?P<number>[-+.\de]+)\s*deg")
 _TOP_KEY = re.compile(rb"^linkage\s*:", re.MULTILINE)
@@ -44,7 +44,8 @@ def load(path: object) -> Linkage:
         motors: [crank at A]
 
     Further keys: `gravity`; `plates` and `slides`, as bars; `masses` (each {bar, at, mass}), `springs` (each {between,
-    stiffness, length}). A bar is a list of its points, or what `Linkage.bar` takes. Angles may be written as 30 deg.
+    stiffness, length}), `gears` (each {between: [driver, driven], ratio, carrier}). A bar is a list of its points, or
+    what `Linkage.bar` takes. Angles may be written as 30 deg.
 
     Args:
         path: the file.
@@ -90,6 +91,10 @@ class _Reader:
             entries = self.entries(("springs", k), value, ("between", "stiffness"), made.spring)
             ends = self.names(("springs", k, "between"), entries.pop("between"))
             self.say(("springs", k), made.spring, *ends, **entries)
+        for k, value in enumerate(self.sequence(("gears",), content)):
+            entries = self.entries(("gears", k), value, ("between", "ratio"), made.gear)
+            ends = self.names(("gears", k, "between"), entries.pop("between"))
+            self.say(("gears", k), made.gear, *ends, **entries)
         for k, value in enumerate(self.sequence(("motors",), content)):
             found = _MOTOR.fullmatch(value.strip()) if isinstance(value, str) else None
             if found is None:
@@ -169,7 +174,7 @@ class _Reader:
             raise self.fail(where, f"cannot be understood ({error})") from error
 
 
-_TEXTS = ("points", "between", "bar", "at", "on", "places")
+_TEXTS = ("points", "between", "bar", "at", "carrier", "on", "places")
 """Words whose values are names, or mappings that are read on their own."""
 
 

@@ -41,6 +41,7 @@ def linkage_text(linkage: Linkage) -> str:
     motors = (
         " ".join([m.link, *(["at", m.at] if m.at else []), *(["on", m.on] if m.on else [])]) for m in linkage.motors
     )
+    lines += _list("gears", (_gear(x) for x in linkage.gears))
     lines += _list("motors", motors)
     return "\n".join([*lines, ""])
 
@@ -88,6 +89,11 @@ def _spring(spring: Any) -> dict[str, Any]:
     if spring.damping:
         out["damping"] = spring.damping
     return out
+
+
+def _gear(gear: Any) -> dict[str, Any]:
+    out: dict[str, Any] = {"between": [gear.driver, gear.driven], "ratio": gear.ratio}
+    return out if gear.carrier == GROUND else {**out, "carrier": gear.carrier}
 
 
 def _block(word: str, things: Mapping[str, Mapping[str, Any]]) -> list[str]:

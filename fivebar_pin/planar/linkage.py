@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, number
+from fivebar_pin._arrays import checked, number
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.diagnosis import Actuation, Diagnosis, diagnose
-from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError, UnknownNameError
-from fivebar_pin.kinematics import assemble, closure_residual
-from fivebar_pin.planar._build import HOME, built
+from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.planar._build import built
+from fivebar_pin.planar._closing import closed_at_home
 from fivebar_pin.planar._parts import (
     ALUMINIUM,
     GROUND,
     THICKNESS,
     WIDTH,
+    Gear,
     Guide,
     Link,
     Lump,
@@ -31,12 +31,8 @@ from fivebar_pin.planar._parts import (
 
 __all__ = ["Linkage"]
 
-_CLOSED = 1e-12
-"""Gap up to which a linkage is closed: round-off of its sketch, and where `assemble` stops [m, relative above 1 m]."""
 _DOWN = (0.0, -9.81, 0.0)
 _NAME = re.compile(r"\w[\w.-]*")
-_SETS = 4
-"""How many sets of motors an error proposes."""
 
 
 class Linkage:
@@ -78,6 +74,7 @@ class Linkage:
         self.links: dict[str, Link] = {GROUND: Link(GROUND, ())}
         self.lumps: list[Lump] = []
         self.springs: list[PointSpring] = []
+        self.gears: list[Gear] = []
         self.motors: list[Motor] = []
 
     def points(self, places: Mapping[str, Sequence[float]] | None = None, /, **named: Sequence[float]) -> None:
@@ -92,8 +89,10 @@ class Linkage:
     def ground(self, *points: str, **named: Sequence[float]) -> None:
         """Fix points to the ground: names of sketched points, or P=(x, y) [m] for new ones."""
         self.points(named)
-        link = self.links[GROUND]
-        self.links[GROUND] = replace(link, points=(*link.points, *self._known((*points, *named))))
+        fixed = (*self.links[GROUND].points, *self._known((*points, *named)))
+        if len(set(fixed)) < len(fixed):
+            raise InvalidInputError("points of the ground", fixed, "must be named once")
+        self.links[GROUND] = Link(GROUND, fixed)
 
     def bar(
         self,
@@ -192,6 +191,23 @@ class Linkage:
         ]
         self.springs.append(PointSpring((ends[0], ends[1]), *values))
 
+    def gear(self, driver: str, driven: str, *, ratio: float, carrier: str = GROUND) -> None:
+        """Gear two links to each other: turn of `driven` = ratio * turn of `driver`, both counted on the carrier.
+
+        They mesh as they lie in the sketch, and count their turns. Wheels that touch outside turn against each other:
+        ratio = -teeth of the driver / teeth of the driven. A wheel is a bar with one point and a mass of its own.
+
+        Args:
+            driver, driven: links that turn.
+            ratio: of their angles on the carrier; not zero [-].
+            carrier: link that carries both wheels; the ground unless given.
+        """
+        if number(f"ratio of gear {driver}_{driven}", ratio) == 0.0:
+            raise InvalidInputError(f"ratio of gear {driver}_{driven}", ratio, "must not be zero")
+        if len({driver, driven, carrier}) < 3:
+            raise InvalidInputError("links of a gear", (driver, driven, carrier), "must be three different ones")
+        self.gears.append(Gear(driver, driven, float(ratio), carrier))
+
     def motor(self, link: str, *, at: str = "", on: str = "") -> None:
         """Drive a link: where it turns at a point, or along its line when it is a slide.
 
@@ -218,17 +234,12 @@ class Linkage:
             self.sketch,
             dict(sorted(self.links.items(), key=lambda item: _rank(item[1]))),
             motors=motors,
+            gears=self.gears,
             lumps=self.lumps,
             springs=self.springs,
             gravity=self.gravity,
         )
-        home = chain.references[HOME]
-        found = diagnose(chain, home)
-        self._check_closed(chain, found)
-        self._check_motors(chain, found)
-        model = chain.model.copy()
-        model.referenceConfigurations[HOME] = _closed(chain, home, found)
-        return replace(chain, model=model)
+        return closed_at_home(chain, self.links)
 
     def save(self, path: object, *, overwrite: bool = False) -> Path:
         """Write the linkage as a file that `fivebar_pin.planar.load` reads, and a person.
@@ -280,6 +291,9 @@ class Linkage:
             raise UnknownNameError(f"point of {link}", point, points)
 
     def _check_links(self) -> None:
+        for gear in self.gears:
+            for name in (gear.driver, gear.driven, gear.carrier):
+                self._link(name)
         for link in self.links.values():
             self._known(link.points)
             if link.guide is not None:
@@ -308,67 +322,10 @@ class Linkage:
             )
         return replace(motor, on=GROUND if GROUND in others else others[0])
 
-    def _check_closed(self, chain: ClosedChain, found: Diagnosis) -> None:
-        if not chain.closures:
-            return
-        gaps = np.abs(closure_residual(chain, found.q))
-        if gaps.max() <= _CLOSED * max(1.0, chain.length):
-            return
-        rows = [closure.name for closure in chain.closures for _ in closure.row_names]
-        worst = rows[int(np.argmax(gaps))]
-        raise AssemblyError(
-            f"The lengths of {self.name} do not close: at point {worst} the bars stay {gaps.max():.3g} m "
-            "apart at best. Change a length, or sketch the points nearer to how they are to lie.",
-            closure=worst,
-            residual=float(gaps.max()),
-        )
-
-    def _check_motors(self, chain: ClosedChain, found: Diagnosis) -> None:
-        mobility = found.generic_mobility
-        if mobility <= 0:
-            raise InvalidInputError(
-                f"mobility of {self.name}", mobility, "leaves nothing to drive: it is a structure", "Take a bar out."
-            )
-        if mobility == chain.na and found.actuation is Actuation.EXACT:
-            return
-        sets = [" and ".join(self._words(chain, joint) for joint in s.joints) for s in found.actuated_sets[:_SETS]]
-        could = f"Drive {'; or '.join(sets)}." if sets else ""
-        if mobility != chain.na:
-            rule = f"must be {mobility}: that is the mobility of {self.name}"
-            raise InvalidInputError("number of motors", chain.na, rule, could)
-        free = ", ".join(found.undetermined)
-        raise InvalidInputError("motors", chain.actuated, f"do not determine the motion: they leave {free} free", could)
-
-    def _words(self, chain: ClosedChain, joint: str) -> str:
-        """Return a joint in the words of a motor."""
-        link, parent = self.links.get(joint), _parent_of(chain, joint)
-        if link is None:
-            return joint
-        if link.guide is not None and link.guide.on == parent:
-            return joint
-        shared = [point for point in link.points if point in self.links[parent].points] if parent in self.links else []
-        return f"{joint} at {shared[0]}" if shared else joint
-
 
 def _rank(link: Link) -> int:
     """Order links as files do, so that what is read back is the same to the last frame: bars, plates, slides."""
     return 2 if link.guide is not None else int(link.section is not None and link.section.plate)
-
-
-def _parent_of(chain: ClosedChain, joint: str) -> str:
-    model = chain.model
-    parent = model.parents[model.getJointId(joint)]
-    return str(model.names[parent]) if parent else GROUND
-
-
-def _closed(chain: ClosedChain, home: Array, found: Diagnosis) -> Array:
-    """Return home closed: as it is, with the motors held there, or else as near as it comes."""
-    if not chain.closures or np.abs(closure_residual(chain, home)).max() <= _CLOSED:
-        return home
-    try:
-        return assemble(chain, home[chain.actuated_index], near=home)
-    except (AssemblyError, SingularityError):
-        return found.q
 
 
 def _checked_name(kind: str, name: object) -> str:

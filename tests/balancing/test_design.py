@@ -227,7 +227,7 @@ def test_farkas_certificate_holds_when_recomputed_here() -> None:
     """z with G^T z = 0, g.z < 0 and z in the dual cone, block by block, from the raw program."""
     chain, _ = case_I()
     problem = balance_problem(chain, "dynamic", region=Ball(REACH))
-    program = problem.program
+    program = problem.form.program
     outcome = solve(program, np.zeros(program.n), np.zeros(program.n))
     assert outcome.certificate is not None
     z = polished(program, outcome.z, program.g)

@@ -15,6 +15,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin.balancing import Ball, Box, Design, balance, balance_problem, pareto
 from fivebar_pin.balancing.parameters import pseudo_inertia
+from fivebar_pin.balancing.solve import exact
 from fivebar_pin.balancing.solvers import SOLVERS, Block, Program, solve, solver_named
 from fivebar_pin.balancing.solvers import answer as answers
 from fivebar_pin.balancing.solvers import clarabel as clarabel_file
@@ -166,7 +167,7 @@ def test_a_bound_of_a_design_counts_what_stationarity_leaves_over(monkeypatch: p
     monkeypatch.setattr(clarabel_file, "answers", sloppy)
     design = problem.solve("added_mass")
     assert design.dual_bound <= best.objective
-    assert max(seen) * problem.mass > best.dual_bound
+    assert max(seen) * problem.form.setting.mass > best.dual_bound
 
 
 def test_a_ray_proves_only_what_the_bounds_on_the_variables_let_it() -> None:
@@ -319,26 +320,27 @@ def test_designs_that_exist_only_as_points_and_sheets_are_found(region: Ball | B
 
 def test_bodies_left_empty_leave_the_program_without_a_trace() -> None:
     """No condition of round-off is left over, and moving a design onto the conditions gives them no material."""
-    problem = balance_problem(delta(), "force", material=None)
-    assert [m.label for m, gone in zip(problem.materials, problem.gone, strict=True) if gone] == [
+    form = balance_problem(delta(), "force", material=None).form
+    assert [p.part.label for p, gone in zip(form.parts, form.gone, strict=True) if gone] == [
         "material added to slide_x",
         "material added to slide_y",
     ]
-    assert np.abs(problem.program.G).max(axis=1).min() > 1e-3
-    y, _ = problem._exact(np.random.default_rng(0).uniform(0.1, 1.0, problem.n), 0.0)
-    for m, gone in zip(problem.materials, problem.gone, strict=True):
-        assert y[m.start : m.start + m.size].any() != gone
+    assert np.abs(form.program.G).max(axis=1).min() > 1e-3
+    y, _ = exact(form, np.random.default_rng(0).uniform(0.1, 1.0, form.n), 0.0)
+    for p, gone in zip(form.parts, form.gone, strict=True):
+        assert y[p.where].any() != gone
 
 
 def test_masses_that_cancel_in_pairs_are_left_empty() -> None:
     """m(a) + m(b) = 0 and m(c) - m(d) = 0 empty the first two bodies alone; a bound above zero empties none."""
     from fivebar_pin.balancing.facial_reduction import empty, without
     from fivebar_pin.balancing.variables.material import Bounds, material
+    from fivebar_pin.balancing.variables.part import Placed
 
-    materials = [material(b, 1, 4 * b, f"{b}", Bounds(), planar=True) for b in range(4)]
+    materials = [Placed(material(b, 1, f"{b}", Bounds(), planar=True), 4 * b) for b in range(4)]
     rows = np.zeros((2, 16))
     rows[0, [0, 4]], rows[1, [8, 12]] = 1.0, (1.0, -1.0)
-    own = [b for m in materials for b in m.blocks(16)]
+    own = [m.widened(b, 16) for m in materials for b in m.part.cones]
     equal = Block("equal", "zero", rows, np.zeros(2))
     assert empty([equal, *own], materials, 16) == (True, True, False, False)
     below = Block("below", "nonneg", -rows[:1], np.zeros(1))

@@ -567,14 +567,14 @@ def alone(what: str) -> fb.Loads:
         model.damping = np.array([0.3, 0.5, 0.7])
     if what == "armature":
         model.armature = np.array([0.3, 0.5, 0.7])
-    chain = fb.ClosedChain(model, four_bar().closures, ("crank",))
+    springs = [fb.JointSpring("coupler", 5.0, 0.0)] if what == "spring" else []
+    chain = fb.ClosedChain(model, four_bar().closures, ("crank",), springs=springs)
     if what != "weight":
         chain = chain.with_inertial_parameters(np.zeros((3, 10)))
     moving = float(what in ("friction", "damping"))
     motion = Motion([0.0], [[0.9]], [[moving]], [[float(what == "armature")]])
     push = {"rocker_end": np.array([1.0, -2.0, 0.0, 0.0, 0.0, 0.4])} if what == "push" else {}
-    springs = [fb.JointSpring("coupler", 5.0, 0.0)] if what == "spring" else []
-    return fb.inverse_dynamics(chain, fb.drive(chain, motion), about=(0.2, -0.4, 0.3), external=push, springs=springs)
+    return fb.inverse_dynamics(chain, fb.drive(chain, motion), about=(0.2, -0.4, 0.3), external=push)
 
 
 @pytest.mark.parametrize("what", ["weight", "push", "spring", "friction", "damping", "armature"])

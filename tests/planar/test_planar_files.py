@@ -38,6 +38,10 @@ def rich() -> Linkage:
     made.slide("block", "on", "7", on="rocker", angle=0.3, through=(0.4, 0.1), places={"7": (0.1, 0.0)}, mass=0.3)
     made.mass("crank", at="A", mass=0.2, centre=(-0.05, 0.0), inertia=1e-4)
     made.spring("C", "B", stiffness=120.0, length=0.1, damping=2.0)
+    made.bar("wheel", "B", density=0.0)
+    made.gear("crank", "wheel", ratio=-2.0)
+    made.bar("planet", "D")
+    made.gear("wheel", "planet", ratio=-0.5, carrier="rocker")
     made.motor("crank", at="A", on="ground")
     return made
 
@@ -110,6 +114,7 @@ def load_text(folder: Path, text: str) -> Linkage:
         ("motors", "masses: [{bar: crank, at: A, mass: -1}]\nmotors", r"masses\[0\] \(line 8\): mass on crank = -1"),
         ("motors", "masses: [crank]\nmotors", r"masses\[0\] \(line 8\): must map words to values, such as bar"),
         ("motors", "springs: [{between: [A], stiffness: 1}]\nmotors", r"springs\[0\] \(line 8\): cannot be understood"),
+        ("motors", "gears: [{between: [crank, rocker]}]\nmotors", r"gears\[0\] \(line 8\): ratio is missing"),
         ("motors", "slides: {s: {points: [P], angle: 3 dog}}\nmotors", r"slides, s, angle \(line 8\): '3 dog'"),
         ("motors", "slides: {s: {points: []}}\nmotors", r"slides, s \(line 8\): points of s"),
         ("linkage: four", "linkage: [", r"is not plain YAML"),

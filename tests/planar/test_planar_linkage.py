@@ -271,6 +271,17 @@ def test_too_many_motors_are_counted_against_the_mobility() -> None:
         made.chain()
 
 
+def test_motors_in_the_wrong_places_are_told_what_they_leave_free() -> None:
+    made = plain("two")
+    made.points(E=(0.1, -0.1), F=(0.4, -0.3))
+    for name, ends in {"first": "AE", "second": "EF", "third": "BF"}.items():
+        made.bar(name, *ends)
+    made.motor("crank", at="A")
+    made.motor("rocker", at="B")
+    with pytest.raises(InvalidInputError, match=r"do not determine the motion: they leave .*first.* free.*Drive"):
+        made.chain()
+
+
 def test_a_loop_of_motors_is_refused() -> None:
     made = plain()
     for link, at in (("crank", "A"), ("crank", "C"), ("rocker", "D"), ("rocker", "B")):
@@ -323,6 +334,11 @@ def test_lengths_that_do_not_close_name_the_point_and_the_gap() -> None:
         (lambda m: m.plate("x", "A", "D"), InvalidInputError, "three or more"),
         (lambda m: m.points(A=(0, 0)), InvalidInputError, "sketched twice"),
         (lambda m: m.points(Q=(0, 0, 0)), InvalidInputError, r"must be \(2,\)"),
+        (lambda m: Linkage("x", gravity=(0, 0, 0, 1)), InvalidInputError, "gravity"),
+        (lambda m: m.slide("x", "C", angle=np.nan), InvalidInputError, "angle of slide x"),
+        (lambda m: m.slide("x", "C", through=(1,)), InvalidInputError, "through of slide x"),
+        (lambda m: m.slide("x"), InvalidInputError, "must be one or more"),
+        (lambda m: m.ground("A"), InvalidInputError, "must be named once"),
         (lambda m: m.ground("Q"), UnknownNameError, "point 'Q'"),
         (lambda m: m.mass("crank", at="D", mass=1.0), UnknownNameError, "point of crank"),
         (lambda m: m.mass("crank", at="A", mass=-1.0), InvalidInputError, "must not be negative"),
@@ -347,7 +363,11 @@ def test_what_is_wrong_is_said_at_once(say, kind, message) -> None:
         (lambda m: (m.bar("x", "C", "X"), m.motor("x", at="C")), InvalidInputError, "Say on="),
         (lambda m: m.slide("s", "C", on="nowhere"), UnknownNameError, "bar 'nowhere'"),
         (lambda m: m.slide("s", "C", on="s"), InvalidInputError, "slides on itself"),
-        (lambda m: m.bar("crank_C", "C", "X"), InvalidInputError, "would name two"),
+        (lambda m: m.bar("crank_C", "C", "X"), InvalidInputError, "would name two frames"),
+        (lambda m: m.bar("B_x", "C", "X"), InvalidInputError, "would name two lengths"),
+        (lambda m: m.spring("A", "X", stiffness=1.0), InvalidInputError, "point X of a spring"),
+        (lambda m: (m.points(Q=(0.05, 0.09)), m.bar("x", "C", "Q")), InvalidInputError, "lie on each other"),
+        (lambda m: (m.bar("x", "C", "X", "Y"), m.spring("X", "Y", stiffness=1.0)), InvalidInputError, "of one bar"),
     ],
 )
 def test_what_is_wrong_with_the_whole_is_said_by_chain(say, kind, message) -> None:

@@ -110,8 +110,7 @@ def test_a_bar_may_hang_on_the_block_that_slides_along_it() -> None:
         assert np.exp(1j * turned) == pytest.approx(np.exp(1j * start), abs=1e-13)
 
 
-def test_a_ring_of_slides_is_closed_by_a_weld_on_a_block() -> None:
-    """Three bodies that slide on each other in a ring: the last slide is cut; two freedoms, turn and shape."""
+def ring() -> Linkage:
     made = Linkage("ring")
     made.ground(A=(0, 0))
     made.points(P=(0.1, 0.0), Q=(0.1, 0.1), R=(0.0, 0.1))
@@ -122,13 +121,25 @@ def test_a_ring_of_slides_is_closed_by_a_weld_on_a_block() -> None:
         made.mass(name, at=point, mass=1.0, inertia=0.01)
     made.motor("a", at="A")
     made.motor("b")
-    chain = made.chain()
+    return made
+
+
+def test_a_ring_of_slides_is_closed_by_a_weld_on_a_block() -> None:
+    """Three bodies that slide on each other in a ring: the last slide is cut; two freedoms, turn and shape."""
+    chain = ring().chain()
     assert [c.kind.value for c in chain.closures] == ["6d"]
     found = fb.diagnose(chain, chain.references["home"])
     assert found.mobility == 2 and found.gap < 1e-14
     trajectory = drive(chain, by=0.05)
     loads = fb.inverse_dynamics(chain, trajectory)
     assert np.abs(loads.power_residual()).max() < 1e-10
+
+
+def test_the_name_of_the_block_is_taken() -> None:
+    made = ring()
+    made.bar(f"{made.chain().closures[0].name}_block", "A")
+    with pytest.raises(InvalidInputError, match="is needed for a sliding block"):
+        made.chain()
 
 
 def test_a_driven_slide_is_a_motor_of_the_tree() -> None:

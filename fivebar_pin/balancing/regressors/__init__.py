@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from fivebar_pin.balancing.regressors.regressor import QUANTITIES, Regressor, regressor
+from fivebar_pin.balancing.regressors.regressor import MEASURES, QUANTITIES, Regressor, regressor
 
-__all__ = ["QUANTITIES", "Regressor", "regressor"]
+__all__ = ["MEASURES", "QUANTITIES", "Regressor", "regressor"]

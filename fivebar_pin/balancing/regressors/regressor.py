@@ -15,13 +15,13 @@ friction and springs do not depend on the parameters: they make the offset.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked, cross, finite, frozen, reals
+from fivebar_pin.balancing.regressors.bearings import bearing_forces, by_bearing
 from fivebar_pin.balancing.regressors.body_motion import (
     gravity_of,
     motion_of_bodies,
@@ -31,13 +31,14 @@ from fivebar_pin.balancing.regressors.body_motion import (
     tree_torque,
     turned,
 )
+from fivebar_pin.balancing.regressors.quantity import Quantity, by_motor, deviation
 from fivebar_pin.balancing.regressors.reaction_rows import marked, reaction_matrices
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["QUANTITIES", "Regressor", "regressor"]
+__all__ = ["MEASURES", "QUANTITIES", "TABLE", "Regressor", "regressor"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +82,8 @@ def regressor(
         chain: the mechanism; its present inertial parameters play no part.
         trajectory: of this chain.
         quantity: one of `QUANTITIES`: linear_momentum, angular_momentum, shaking_force, shaking_moment, frame_force,
-            frame_moment (3 rows each), torque, gravity_torque (na rows), potential_energy, kinetic_energy (1 row),
+            frame_moment (3 rows each), torque, gravity_torque (na rows, the weight's alone: springs are in torque),
+            potential_energy, kinetic_energy (1 row),
             joint_reactions (6 rows per body), closure_reactions (6 rows per closure). Signs, axes and meaning are
             those of `inverse_dynamics`: the rotors (armature) are in the torque alone.
         about: point that angular momentum, shaking and frame moment refer to (3,) [m], world.
@@ -90,10 +92,11 @@ def regressor(
         UnknownNameError: a quantity that does not exist.
         InvalidInputError: a trajectory of another mechanism.
     """
-    if quantity not in _BUILDERS:
+    build = TABLE[quantity].build if quantity in TABLE else None
+    if build is None:
         raise UnknownNameError("quantity", quantity, QUANTITIES)
     trajectory.require_of(chain)
-    matrix, offset = _BUILDERS[quantity](chain, trajectory, checked("about", about, (3,)))
+    matrix, offset = build(chain, trajectory, checked("about", about, (3,)))
     return Regressor(quantity, frozen(matrix), frozen(offset))
 
 
@@ -164,18 +167,20 @@ def _closure_reactions(chain: ClosedChain, trajectory: Trajectory, about: Array)
     return marked(reaction_matrices(chain, trajectory)[1], inverse_dynamics(chain, trajectory).closure_reactions)
 
 
-_BUILDERS: dict[str, Callable[[ClosedChain, Trajectory, Array], tuple[Array, Array]]] = {
-    "linear_momentum": _linear_momentum,
-    "angular_momentum": _angular_momentum,
-    "shaking_force": _shaking_force,
-    "shaking_moment": _shaking_moment,
-    "frame_force": _frame_force,
-    "frame_moment": _frame_moment,
-    "torque": _torque,
-    "gravity_torque": _gravity_torque,
-    "potential_energy": _potential_energy,
-    "kinetic_energy": _kinetic_energy,
-    "joint_reactions": _joint_reactions,
-    "closure_reactions": _closure_reactions,
-}
-QUANTITIES = tuple(_BUILDERS)
+TABLE: dict[str, Quantity] = {
+    "torque": Quantity(_torque, _torque, by_motor),
+    "shaking_force": Quantity(_shaking_force, _shaking_force),
+    "shaking_moment": Quantity(_shaking_moment, _shaking_moment),
+    "frame_force": Quantity(_frame_force, _frame_force),
+    "frame_moment": Quantity(_frame_moment, _frame_moment),
+    "bearing_force": Quantity(None, bearing_forces, by_bearing),
+    "angular_momentum": Quantity(_angular_momentum, deviation(_angular_momentum)),
+    "linear_momentum": Quantity(_linear_momentum),
+    "gravity_torque": Quantity(_gravity_torque),
+    "potential_energy": Quantity(_potential_energy),
+    "kinetic_energy": Quantity(_kinetic_energy),
+    "joint_reactions": Quantity(_joint_reactions),
+    "closure_reactions": Quantity(_closure_reactions),
+}  # a new quantity is one entry here
+QUANTITIES = tuple(name for name, quantity in TABLE.items() if quantity.build is not None)
+MEASURES = tuple(name for name, quantity in TABLE.items() if quantity.judged is not None)

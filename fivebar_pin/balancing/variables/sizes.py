@@ -1,8 +1,7 @@
-"""How large the variables of a problem can be: what bounds and proofs are rigorous within.
+"""How large variables can be: what bounds and proofs are rigorous within.
 
-The mass of a piece is at most its bound. With R the radius about the origin that holds its region in the mean square,
-|h| <= R m, and second moments and inertias are at most R^2 m; what is taken from a body is no more than the body. Other
-variables follow from linear consequences of their cones, s_0 >= |s_k| and M_ii t + M_jj / t >= 2 |M_ij|, by intervals.
+Where it is not known of a variable, it follows from linear consequences of its cones, s_0 >= |s_k| and
+M_ii t + M_jj / t >= 2 |M_ij|, by intervals.
 """
 
 from __future__ import annotations
@@ -13,17 +12,16 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers import Block
-from fivebar_pin.balancing.variables.material import Material
 
-__all__ = ["extents"]
+__all__ = ["stated", "tightened"]
 
 _PASSES = 12  # of intervals over the rows; forms that stand on each other are fewer levels high
 _WEIGHTS = 4.0 ** np.arange(-6, 7)  # t of the pairs of a matrix
 
 
-def extents(materials: Sequence[Material], gone: Sequence[bool], blocks: Sequence[Block], n: int) -> Array:
-    """Return bounds b (n,) with |y_i| <= b_i for all designs; infinite where none was found."""
-    heaviest = np.full(n, np.inf)
+def stated(blocks: Sequence[Block], n: int) -> Array:
+    """Return the upper bound on each of n variables that some row states for it alone; infinite where none does."""
+    most = np.full(n, np.inf)
     for block in blocks:
         if block.cone not in ("zero", "nonneg"):
             continue
@@ -31,34 +29,18 @@ def extents(materials: Sequence[Material], gone: Sequence[bool], blocks: Sequenc
         for row, offset in zip(block.G[single], block.g[single], strict=True):
             k = int(np.argmax(row != 0.0))
             if row[k] < 0.0 or block.cone == "zero":
-                heaviest[k] = min(heaviest[k], max(0.0, -offset / row[k]))
-    parts = [np.zeros(m.size) if g else _own(m, heaviest[m.start]) for m, g in zip(materials, gone, strict=True)]
-    return np.concatenate(parts) if parts else np.zeros(0)
+                most[k] = min(most[k], max(0.0, -offset / row[k]))
+    return most
 
 
-def _own(m: Material, heaviest: float) -> Array:
-    """Return the bounds on the variables (size,) of one piece."""
-    low, high = np.full(m.size, -np.inf), np.full(m.size, np.inf)
-    most = heaviest * _radius(m) ** np.concatenate([[0.0], np.ones(m.width - 1)])
-    most[m.inertias] = heaviest * _radius(m) ** 2
-    if m.bounds.taken_from is not None:  # entries of a matrix between zero and the body's
-        most = np.minimum(np.append(most, np.full(10 - m.width, np.inf)), float(np.trace(m.bounds.taken_from)))
-    low[: most.size], high[: most.size] = -most, most
-    low[0] = 0.0
-    rows = _consequences(m.own)
+def tightened(cones: Sequence[Block], low: Array, high: Array) -> Array:
+    """Return bounds b (n,) with |y_i| <= b_i that follow from low <= y <= high (n,) in cones."""
+    low, high, rows = np.array(low), np.array(high), _consequences(cones)
     for _ in range(_PASSES):
         if np.isfinite(low).all() and np.isfinite(high).all():
             break
         _tighten(rows, low, high)
     return np.asarray(np.maximum(np.abs(low), np.abs(high)))
-
-
-def _radius(m: Material) -> float:
-    shape = m.bounds.shape
-    if shape is None:
-        return np.inf
-    spread = np.linalg.norm(shape.semi_axes) if shape.kind == "box" else shape.semi_axes.max()
-    return float(np.linalg.norm(shape.center) + spread)
 
 
 def _consequences(blocks: Sequence[Block]) -> Array:

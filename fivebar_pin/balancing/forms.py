@@ -15,7 +15,7 @@ from fivebar_pin.balancing.solvers import Block, svec
 
 __all__ = ["Cones", "constant"]
 
-_LIMIT = 48  # variables of one piece
+_LIMIT = 48  # variables of one piece; a form is a row of this many factors, however few are used [-]
 
 
 class Cones:
