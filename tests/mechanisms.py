@@ -253,13 +253,13 @@ def double_four_bar() -> fb.ClosedChain:
     return fb.ClosedChain(model, closures, ("upright0",))
 
 
-def side_by_side(*lengths: Sequence[float], apart: float = 3.0) -> fb.ClosedChain:
+def side_by_side(*lengths: Sequence[float], apart: float = 3.0, tilt: pin.SE3 = AT_ORIGIN) -> fb.ClosedChain:
     """Return planar four-bars in one model that share nothing but the ground, `apart` from each other [m]."""
     model = pin.Model()
     model.name = "side_by_side"
     closures, cranks = [], []
     for k, (a, b, c, d) in enumerate(lengths):
-        base = at(apart * k)
+        base = tilt * at(apart * k)
         crank = add(model, 0, pin.JointModelRZ(), base, f"crank{k}", body(3 * k + 1))
         coupler = add(model, crank, pin.JointModelRZ(), at(a), f"coupler{k}", body(3 * k + 2))
         rocker = add(model, 0, pin.JointModelRZ(), base * at(d), f"rocker{k}", body(3 * k + 3))

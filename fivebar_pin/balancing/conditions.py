@@ -36,6 +36,13 @@ _SMALL = 1e-6  # a singular value this far below the largest may be counted as z
 _MOST_SAMPLES = 1_000_000  # configurations; their rows are held in memory at once
 _CLEAR = 1e3  # ratio of neighbouring singular values that counts as a clear decision [-]
 _DOUBLINGS = 4  # how often the samples are doubled while the decision is not clear
+_NOTHING = 1e-12  # a largest singular value below this is that of a mechanism that cannot be felt at all [-]
+_ZERO = 1e-17  # what a singular value of zero counts as, so that a full rank is a gap too [of the largest]
+_PIVOT = 1e-6  # part of a column outside those chosen before that lets it lead a row [-, rows of length one]
+_NOISE = 1e-9  # factor of a written condition that is left out [of the largest of its row]
+_SIMPLE = 1e-9  # difference to a simple fraction that is round-off [of the factor]
+_LEAST_FACTOR = 1e-3  # size of factors below which the difference counts as absolute [-]
+_DENOMINATOR = 1000  # the largest of a simple fraction
 _ALIKE = 1e-9  # difference up to which directions [-], points, placements and configurations are the same [m, rad]
 
 
@@ -375,10 +382,10 @@ def _conditions(
 
 def _gap(s: Array) -> tuple[int, float]:
     """Return the rank at the widest gap below the allowed size, and the gap."""
-    if not s.size or s[0] < 1e-12:
+    if not s.size or s[0] < _NOTHING:
         return 0, float("inf")
-    floor = np.maximum(s / s[0], 1e-17)
-    extended = np.append(floor, 1e-17)  # a full rank is a gap to zero
+    floor = np.maximum(s / s[0], _ZERO)
+    extended = np.append(floor, _ZERO)  # a full rank is a gap to zero
     ratio = extended[:-1] / extended[1:]
     allowed = extended[1:] < _SMALL
     if floor[-1] > _SMALL:
@@ -397,7 +404,7 @@ def _echelon(basis: Array, space: Space) -> Array:
     chosen = np.zeros((rank, 0))
     for k in preference:
         left = basis[:, k] - chosen @ (chosen.T @ basis[:, k])
-        if len(pivots) < rank and np.linalg.norm(left) > 1e-6:
+        if len(pivots) < rank and np.linalg.norm(left) > _PIVOT:
             pivots.append(k)
             left -= chosen @ (chosen.T @ left)
             chosen = np.column_stack([chosen, left / np.linalg.norm(left)])
@@ -408,7 +415,7 @@ def _readable(echelon: Array, space: Space) -> Array:
     """Return the form in SI units: leading factor one, noise gone, simple fractions recognised."""
     out = np.zeros_like(echelon)
     for row, tidy in zip(echelon, out, strict=True):
-        real = np.abs(row) > 1e-9 * np.abs(row).max()
+        real = np.abs(row) > _NOISE * np.abs(row).max()
         lead = int(np.argmin(np.abs(row - 1.0)))
         for k in np.flatnonzero(real):
             tidy[k] = _tidy(float(row[k] / space.scale[k] * space.scale[lead]))
@@ -417,8 +424,8 @@ def _readable(echelon: Array, space: Space) -> Array:
 
 def _tidy(x: float) -> float:
     """Return the simple fraction that x stands for, if there is one."""
-    simple = float(Fraction(x).limit_denominator(1000))
-    return simple if abs(simple - x) < 1e-9 * max(abs(x), 1e-3) else x
+    simple = float(Fraction(x).limit_denominator(_DENOMINATOR))
+    return simple if abs(simple - x) < _SIMPLE * max(abs(x), _LEAST_FACTOR) else x
 
 
 def _equation(row: Array, names: Sequence[str], constant: float = 0.0) -> str:

@@ -23,6 +23,7 @@ __all__ = ["INERTIA_PAIRS", "TEN", "Space", "from_pseudo_inertia", "inertia_matr
 TEN = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 INERTIA_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # order of the inertia entries
 _AXES = "xyz"
+_ALIGNED = 1e-12  # difference of an axis to that of a joint, for the parameter to be called after it [-]
 
 
 def inertia_matrix(pi: Array) -> Array:
@@ -129,7 +130,7 @@ class Space(Immutable):
         letters = []
         for axis in self.axes[b]:
             k = int(np.argmax(np.abs(axis)))
-            letters.append(_AXES[k] if np.allclose(axis, np.eye(3)[k], atol=1e-12) else "")
+            letters.append(_AXES[k] if np.allclose(axis, np.eye(3)[k], atol=_ALIGNED) else "")
         if "" in letters:
             letters = ["1", "2", "n"]
         return ("m", f"mc{letters[0]}", f"mc{letters[1]}", f"I{letters[2]}{letters[2]}")

@@ -259,10 +259,17 @@ def aim_of(mode: str, variables: Sequence[Variable]) -> str:
 
     Raises:
         UnknownNameError: a mode that does not exist.
+        InvalidInputError: variables that are none.
     """
     if mode not in MODES:
         raise UnknownNameError("mode", mode, MODES)
-    return variables[0].aim if variables else MODES[mode].aim
+    return _checked_variables(variables)[0].aim if variables else MODES[mode].aim
+
+
+def _checked_variables(variables: Sequence[Variable]) -> tuple[Variable, ...]:
+    if isinstance(variables, Variable) or not all(isinstance(v, Variable) for v in variables):
+        raise InvalidInputError("variables", variables, "must be a sequence of variables")
+    return tuple(variables)
 
 
 def _changed(mode: str, stated: Stated, variables: Sequence[Variable]) -> tuple[str, tuple[Variable, ...]]:
@@ -277,13 +284,11 @@ def _changed(mode: str, stated: Stated, variables: Sequence[Variable]) -> tuple[
     if not variables:
         removed = (RemovedMaterial(stated.remove, stated.region, stated.density),) if stated.remove else ()
         return mode, (MODES[mode].of(stated), *removed)
-    if isinstance(variables, Variable) or not all(isinstance(v, Variable) for v in variables):
-        raise InvalidInputError("variables", variables, "must be a sequence of variables")
     besides = (stated.bodies, stated.region, stated.masses, stated.counterweight, stated.remove or None)
     if any(given is not None for given in besides):
         rule = "must say all that may change: bodies, region, masses, counterweight and remove have no meaning besides"
         raise InvalidInputError("variables", list(variables), rule)
-    return _WORD, tuple(variables)
+    return _WORD, _checked_variables(variables)
 
 
 def _measurement(

@@ -41,7 +41,8 @@ def load(
             under the same name (.yaml or .yml), or as the folder's only sidecar; an MJCF .xml file; or the name of a
             mechanism that ships (`shipped`), where no file or folder is called so.
         free_flyer: put the root of a URDF on a free-flying base.
-        closures: use these instead of the file's closures; with `actuated`, no sidecar is needed.
+        closures: use these instead of the file's closures, among them the couplings that <mimic> states in a URDF;
+            with `actuated`, no sidecar is needed.
         actuated: drive these joints instead of the file's.
         gravity: use this (3,) [m/s2] instead of the file's.
         max_bytes: size above which a URDF or MJCF file is not read.
@@ -158,17 +159,19 @@ def _load_urdf(
         )
     sidecar = Sidecar() if beside is None else read_sidecar(beside)
     note = beside or urdf
-    tree = _counting(tree, sidecar.closures if closures is None else closures)
+    stated = (*sidecar.closures, *_mimics(tree, sidecar))
+    tree = _counting(tree, stated if closures is None else closures)
     model = build_model(tree, sidecar, free_flyer=free_flyer, urdf=urdf, beside=note)
     if closures is None:
         check_closures(model, sidecar.closures, note, "closed_loop")
+        check_closures(model, stated[len(sidecar.closures) :], urdf, "mimic")
     if actuated is None:
         check_actuated(model, tree, sidecar, note)
     check_springs(model, sidecar.springs, note)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     return make_chain(
         model,
-        sidecar.closures if closures is None else closures,
+        stated if closures is None else closures,
         sidecar.actuated if actuated is None else actuated,
         visuals,
         urdf,
@@ -176,6 +179,13 @@ def _load_urdf(
         springs=sidecar.springs,
         geometry=sidecar.geometry,
     )
+
+
+def _mimics(tree: TreeEntry, sidecar: Sidecar) -> tuple[Closure, ...]:
+    """Return the couplings of joints that mimic others, unless the joint does not move."""
+    fixed = {name for name, word in sidecar.joint_types.items() if word == "FIXED"}
+    moving = [j for j in tree.joints.values() if j.kind != "fixed" and j.name not in fixed]
+    return tuple(j.mimic for j in moving if j.mimic is not None)
 
 
 def _counting(tree: TreeEntry, closures: tuple[Closure, ...]) -> TreeEntry:

@@ -175,6 +175,20 @@ def test_the_bound_on_balls_is_that_of_the_balls_themselves() -> None:
     assert realise(design).attained
 
 
+def test_an_arm_is_a_square_bar_of_its_material_from_the_joint_to_the_rim() -> None:
+    """Mass d w^2 l and inertia m (l^2 + w^2) / 12, w a fifth of the radius of the disc that it carries."""
+    chain, _ = crank_rocker()
+    design = balance(chain, "force", region=Ball(0.3), counterweight=Disc(7850.0, 0.01))
+    assert len(design.arms) == 2
+    for arm in design.arms:
+        disc = next(c for c in design.added if c.body == arm.body)
+        radius = np.sqrt(disc.mass / (np.pi * 7850.0 * 0.01))  # solid, as the least mass asks
+        length, width = float(np.linalg.norm(disc.place[:2])) - radius, 0.2 * radius
+        assert np.linalg.norm(arm.place[:2]) == pytest.approx(0.5 * length, rel=1e-3)
+        assert arm.mass == pytest.approx(7850.0 * width**2 * length, rel=1e-3)
+        assert arm.inertia[2, 2] == pytest.approx(arm.mass * (length**2 + width**2) / 12.0, rel=1e-3)
+
+
 def _smaller(region: Box | Ellipsoid) -> dict[str, object]:
     name = "size" if isinstance(region, Box) else "semi_axes"
     return {name: 0.999 * np.array(getattr(region, name)), "center": region.center}

@@ -306,6 +306,33 @@ def test_a_balance_of_one_branch_finds_the_conditions_of_each_once(monkeypatch: 
     counted.once(6, 6)
 
 
+def test_discs_for_a_design_find_no_conditions_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not in any of the steps in which they are looked for, nor when a design is solved in pieces afterwards."""
+    counted = Counted(monkeypatch)
+    design = balance(shipped.four_bar_crank_rocker(), "force", region=fb.balancing.Ball(0.3))
+    assert fb.balancing.realise(design, shape="disc").attained
+    assert fb.balancing.realise(design, shape="bar").weights
+    counted.once(1, 1)
+
+
+def test_near_and_the_sum_of_squares_find_conditions_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    chain = shipped.four_bar_crank_rocker()
+    motion = fb.motion.harmonic(np.linspace(0.0, 1.0, 21), 0.5, 0.3, period=1.0)
+    counted = Counted(monkeypatch)
+    balance(chain, "force", near=chain.references["home"])
+    fb.balancing.alici_shirinzadeh(chain, motion, region=fb.balancing.Ball(0.3))
+    counted.once(2, 2)
+
+
+def test_one_problem_finds_its_conditions_once_for_all_its_objectives(monkeypatch: pytest.MonkeyPatch) -> None:
+    counted = Counted(monkeypatch)
+    problem = balance_problem(shipped.four_bar_crank_rocker(), "force", objectives=("added_mass", "distance"))
+    for minimise in ("added_mass", "distance", {"added_mass": 1.0, "distance": 0.1}):
+        for solver in ("clarabel", "scipy"):
+            assert problem.solve(minimise, solver=solver).feasible
+    counted.once(1, 1)
+
+
 def test_a_front_finds_its_conditions_once(monkeypatch: pytest.MonkeyPatch) -> None:
     chain = shipped.four_bar_crank_rocker()
     motion = fb.motion.harmonic(np.linspace(0.0, 1.0, 21), 0.5, 0.3, period=1.0)

@@ -206,6 +206,39 @@ def test_no_answer_is_believed_unchecked(kind: str, monkeypatch: pytest.MonkeyPa
     assert kind == "unbounded" or caught.value.residual > caught.value.tolerance
 
 
+@pytest.mark.parametrize(
+    ("x", "z", "q"),
+    [
+        (0.0, 0.0, 0.0),  # outside the cone, x >= 1; no slope, no gap
+        (1.0, 0.0, 1.0),  # the optimum, without the multiplier that proves it: slope and gap
+        (1.5, 1.0, 1.0),  # inside, with the right multiplier: a gap alone
+    ],
+)
+def test_each_part_of_optimality_is_checked_by_itself(
+    x: float, z: float, q: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = Program(1, (block("nonneg", [[1]], [-1]),), np.full(1, 10.0))
+
+    def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
+        yield answers.Answer("solved", np.array([x]), np.array([z]), "solved")
+
+    monkeypatch.setattr(clarabel_file, "answers", wrong)
+    with pytest.raises(SolverError, match="stopped at a residual"):
+        solve(program, np.zeros(1), np.array([q]))
+
+
+def test_a_slope_that_is_left_shows_where_there_is_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """x = 0 of -x over x >= 0: its value is that of z = 0, and yet it is no optimum."""
+    program = Program(1, (block("nonneg", [[1]], [0]),), np.full(1, 10.0))
+
+    def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
+        yield answers.Answer("solved", np.zeros(1), np.zeros(1), "solved")
+
+    monkeypatch.setattr(clarabel_file, "answers", wrong)
+    with pytest.raises(SolverError, match=r"stopped at a residual of 0\.5"):
+        solve(program, np.zeros(1), np.array([-1.0]))
+
+
 def test_multipliers_outside_the_dual_cone_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """x = 6 is not the least; z = (1, -2, 0) has no residual and no gap to 6, but is no multiplier."""
     program = Program(1, STANDARD[1].blocks, np.full(1, 10.0))

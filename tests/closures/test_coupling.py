@@ -447,6 +447,28 @@ def test_a_sidecar_that_couples_badly_is_refused_by_key(old, new, message, tmp_p
         fb.load(written(tmp_path, SIDECAR.replace(old, new)))
 
 
+MIMIC = '<axis xyz="0 0 1"/><mimic joint="a" multiplier="{}" offset="0.2"/></joint></robot>'
+
+
+@pytest.mark.parametrize("multiplier", [3.7, -1.0, 0.0])
+def test_mimic_joints_of_a_urdf_are_couplings(multiplier, tmp_path: Path):
+    """q_b = multiplier q_a + offset, as URDF says; over several turns, and after saving."""
+    path = written(tmp_path, "closed_loop: []\ntype: []\nname_mot: [a]\n")
+    path.write_text(path.read_text().replace('<axis xyz="0 0 1"/></joint></robot>', MIMIC.format(multiplier)))
+    chain = fb.load(path)
+    fb.save(chain, tmp_path / "again.urdf")
+    for each in (chain, fb.load(tmp_path / "again.urdf")):
+        assert [c.name for c in each.closures] == ["b mimic"]
+        moved = fb.drive(each, fb.motion.cycloidal(np.linspace(0.0, 1.0, 101), 0.0, 20.0))
+        a, b = (moved.q[:, each.model.idx_qs[each.model.getJointId(name)]] for name in "ab")
+        np.testing.assert_allclose(b, multiplier * a + 0.2, rtol=0.0, atol=1e-12)
+    assert not fb.load(path, closures=()).closures
+    path.with_suffix(".yaml").write_text(
+        "closed_loop: []\ntype: []\nname_mot: [a]\njoint_name: [b]\njoint_type: [FIXED]\n"
+    )
+    assert fb.load(path).closures == () and fb.load(path).joints == ("a",)
+
+
 MJCF = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="one"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="a"/></body>
 <body name="two"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="b"/></body>

@@ -444,6 +444,20 @@ def test_given_pairs_are_joined_whatever_else_there_is() -> None:
     assert (proposal.closure.frames, proposal.evidence, proposal.chosen) == (given, Evidence.GIVEN, True)
 
 
+def test_a_given_pair_that_locks_is_joined_and_says_so() -> None:
+    (proposal,) = propose_closures(two_bars(), pairs=[("tip_one", "tip_other")])
+    assert proposal.chosen
+    assert proposal.reason == "given; they meet already; it would lock one, other"
+
+
+def test_a_name_that_is_taken_is_not_given_again() -> None:
+    chain = shipped("six_bar_watt")
+    first = replace(chain, closures=(fb.Closure(chain.closures[0].frames, name="G"),))
+    (proposal,) = propose_closures(first)
+    assert proposal.closure.name == "G_strut~G_output" or proposal.closure.name == "G_output~G_strut"
+    assert diagnose(replace(first, closures=(*first.closures, proposal.closure))).generic_mobility == 1
+
+
 def test_what_is_given_wrongly_is_refused() -> None:
     tree = opened(shipped("six_bar_watt"))
     with pytest.raises(UnknownNameError, match=r"Unknown frame 'B_couple'.*Did you mean 'B_coupler'"):
@@ -461,7 +475,9 @@ def test_what_is_given_wrongly_is_refused() -> None:
         propose_motors(tree, np.zeros(3))
 
 
-def motors(names: dict[str, str], *, effort: str = "", mass_of: dict[str, float] | None = None) -> list[str]:
+def motors(
+    names: dict[str, str], *, effort: str = "", limit: float = 5.0, mass_of: dict[str, float] | None = None
+) -> list[str]:
     """Return what is proposed to drive a five-bar with other names of joints, one effort limit or other masses."""
     chain = mechanisms.five_bar()
     model = chain.model.copy()
@@ -470,7 +486,7 @@ def motors(names: dict[str, str], *, effort: str = "", mass_of: dict[str, float]
         model.inertias[j] = body(j, mass=mass) if mass else pin.Inertia.Zero()
     limits = np.full(model.nv, np.inf)
     if effort:
-        limits[model.idx_vs[model.getJointId(effort)]] = 5.0
+        limits[model.idx_vs[model.getJointId(effort)]] = limit
     model.upperEffortLimit = limits
     for j, name in enumerate(model.names):
         model.names[j] = names.get(name, name)
@@ -481,6 +497,7 @@ def test_motors_stand_on_the_ground_unless_names_or_limits_say_otherwise() -> No
     assert motors({}) == ["left", "right"]
     assert motors({"left_elbow": "elbow_motor"}) == ["elbow_motor", "right"]
     assert motors({"left": "free_left"}) == ["left_elbow", "right"]
+    assert motors({}, effort="right_elbow", limit=0.0) == ["left", "right"]
     assert motors({}, effort="right_elbow") == ["left", "right_elbow"]
     assert motors({}, mass_of={"left": 0.0}) == ["right", "right_elbow"]
 

@@ -516,13 +516,14 @@ def test_the_closure_named_is_the_one_that_stays_open_the_most(off):
     assert info.value.closure == f"pin{off}"
 
 
-@pytest.mark.parametrize("size", [1.0, 1e3, 1e6])
+@pytest.mark.parametrize("size", [1.0, 1e3, 1e6, 1e10])
 def test_closed_is_relative_to_the_length_of_a_large_mechanism(size):
-    """Rounding of coordinates of a thousand kilometres is a tenth of a nanometre: no gap."""
+    """Whatever the unit of length: rounding is no gap, and does not tell one assembly mode from itself."""
     lengths = tuple(size * x for x in CRANK_ROCKER)
     chain = four_bar(lengths)
     q = fb.assemble(chain, [0.8])
     np.testing.assert_allclose(np.abs(fb.closure_residual(chain, q)).max(), 0.0, rtol=0.0, atol=1e-12 * size)
+    assert len(fb.assembly_modes(chain, [0.8])) == 2
     moved = fb.drive(chain, turning(0.8, 1.8, 20), q)
     np.testing.assert_allclose(moved.v, fb.drive(four_bar(), turning(0.8, 1.8, 20), q).v, rtol=1e-9, atol=1e-9)
 
@@ -570,3 +571,28 @@ def test_closed_is_one_measure_for_lengths_and_angles_of_a_small_mechanism():
     q = fb.assemble(chain, [2.0, 1.0])
     assert np.abs(fb.closure_residual(chain, q)[:3]).max() < 1e-18
     assert fb.drive(chain, swinging(2.0, 1.0), q).worst_closure < 1e-14
+
+
+@pytest.mark.parametrize("off", [1e-2, 1e-6])
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_limit_is_passed_by_any_amount_that_is_not_rounding(side, off):
+    base = five_bar()
+    free = fb.drive(base, swinging(2.0, 1.0))
+    model, sign = base.model.copy(), 1.0 if side == "upper" else -1.0
+    reached = sign * (sign * free.q[:, 3]).max()
+    chain = fb.ClosedChain(model, base.closures, base.actuated)
+    getattr(chain.model, f"{side}PositionLimit")[3] = reached
+    assert len(fb.drive(chain, swinging(2.0, 1.0), free.q[0])) == 60
+    getattr(model, f"{side}PositionLimit")[3] = reached - sign * off
+    chain = fb.ClosedChain(model, base.closures, base.actuated)
+    with pytest.raises(InvalidInputError, match=r"joint right_elbow at sample .* must stay within its limits"):
+        fb.drive(chain, swinging(2.0, 1.0), free.q[0])
+
+
+def test_a_way_out_of_reach_is_told_from_a_way_through_a_singularity():
+    """From a closed configuration to one that no loop can close: the gap there is the evidence."""
+    chain = five_bar((0.5, 0.8, 0.7, 0.6, 0.9))
+    near = fb.assemble(chain, [1.6, 1.5])
+    with pytest.raises(AssemblyError, match="cannot be assembled at these actuated coordinates: closure tip") as info:
+        fb.assemble(chain, [np.pi, 0.0], near)
+    assert info.value.residual == pytest.approx(0.9 + 0.6 + 0.5 - 1.5, rel=1e-3)

@@ -93,3 +93,40 @@ def test_a_search_keeps_limits():
     assert closed_enough(loops, np.abs(residual_of(loops, found)).max(axis=1), 1e-8)[0]
     free = search(loops, start[None], columns=every)
     assert not limits.inside(loops, free)[0]  # the limits did hold something
+
+
+def test_a_sample_that_is_closed_does_not_end_the_work_on_the_others():
+    chain = CHAINS["four-bar"]
+    loops, q = loops_of(chain), place(chain)
+    far = q + np.array([0.0, 0.15, -0.15])
+    for starts in (np.stack([q, far]), np.stack([far, q])):
+        closed = polish(loops, starts)
+        assert closed.residual.max() < 1e-15
+        np.testing.assert_allclose(closed.q[0], closed.q[1], atol=1e-14)
+
+
+def test_what_is_closed_stays_where_it_is():
+    chain = CHAINS["spatial four-bar"]
+    loops, q = loops_of(chain), place(chain)
+    nearly = loops.tree.integrate(q[None], np.full((1, chain.nv), 2e-14))  # closed, though not to the last digit
+    starts = np.concatenate([nearly, loops.tree.integrate(q[None], np.full((1, chain.nv), 0.05))])
+    found, _ = close(chain, starts, 1e-12)
+    np.testing.assert_array_equal(found[0], nearly[0])
+    assert np.abs(found[1] - starts[1]).max() > 1e-3
+
+
+def test_round_off_far_from_the_origin_ends_an_iteration_too():
+    """30 m away a gap of 1e-14 m is all that can be asked: less than one metre away leaves 2e-15."""
+    chain = mechanisms.four_bar(base=mechanisms.at(31.7, -23.1, 11.3, (0.7, -0.4, 1.1)))
+    manifold = manifold_of(chain)
+    rng, q = np.random.default_rng(6), place(chain)
+    ends = []
+    for _ in range(20):
+        point = manifold.project(q + 0.02 * rng.normal(size=3), 1e-12)
+        rank = manifold.rank_of(point)
+        chart = manifold.chart_at(point, rank)
+        reached = manifold.solve(chart, np.full(chart.B.shape[1], 0.03), point.q[0], rank)
+        assert reached is not None
+        ends.append(float(np.abs(reached.reduced).max()))
+    assert max(ends) > ROUND_OFF  # else the rule was not needed
+    assert max(ends) < 1e-13

@@ -206,14 +206,18 @@ def test_one_group_at_its_dead_point_makes_the_whole_singular(first):
     with pytest.raises(SingularityError, match="type 2 singularity"):
         fb.complement(chain, q)
     x = q[[0, 3]]
+    back = np.array(x)
+    back[0 if first else 1] -= 0.3
+    regular = fb.assemble(chain, back, near=q)
+    with pytest.raises(SingularityError, match="configuration 1 is") as met:
+        fb.complement(chain, np.stack([regular, q, regular]))
+    assert (met.value.sample, met.value.sigma < 1e-7) == (1, True)
     still = fb.Motion(np.array([0.0, 0.1]), np.stack([x, x]), np.zeros((2, 2)), np.zeros((2, 2)))
     with pytest.raises(SingularityError) as caught:
         fb.drive(chain, still, near=q)
     assert (caught.value.sample, caught.value.time) == (0, 0.0)
     assert caught.value.sigma < 1e-7
-    away = np.array(x)
-    away[0 if first else 1] -= 0.3  # back from the dead point both groups are regular
-    N = fb.complement(chain, fb.assemble(chain, away, near=q))
+    N = fb.complement(chain, regular)  # back from the dead point both groups are
     assert np.abs(N[[0, 3]] - np.eye(2)).max() == 0.0
 
 

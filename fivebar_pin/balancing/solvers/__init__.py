@@ -9,7 +9,7 @@ A new solver is a module with a function `answers(problem, tolerance)` that is r
 from __future__ import annotations
 
 from fivebar_pin.balancing.solvers import clarabel, scipy
-from fivebar_pin.balancing.solvers.answer import Answer
+from fivebar_pin.balancing.solvers.answer import Answer, nothing
 from fivebar_pin.balancing.solvers.certificate import Certificate
 from fivebar_pin.balancing.solvers.cones import smat, svec
 from fivebar_pin.balancing.solvers.program import Block, Problem, Program
@@ -27,6 +27,7 @@ __all__ = [
     "Problem",
     "Program",
     "clarabel",
+    "nothing",
     "register",
     "scipy",
     "smat",
