@@ -222,7 +222,7 @@ def test_each_part_of_optimality_is_checked_by_itself(
     def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
         yield answers.Answer("solved", np.array([x]), np.array([z]), "solved")
 
-    monkeypatch.setattr(clarabel_file, "answers", wrong)
+    monkeypatch.setitem(SOLVERS, "clarabel", wrong)
     with pytest.raises(SolverError, match="stopped at a residual"):
         solve(program, np.zeros(1), np.array([q]))
 
@@ -234,7 +234,7 @@ def test_a_slope_that_is_left_shows_where_there_is_no_gap(monkeypatch: pytest.Mo
     def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
         yield answers.Answer("solved", np.zeros(1), np.zeros(1), "solved")
 
-    monkeypatch.setattr(clarabel_file, "answers", wrong)
+    monkeypatch.setitem(SOLVERS, "clarabel", wrong)
     with pytest.raises(SolverError, match=r"stopped at a residual of 0\.5"):
         solve(program, np.zeros(1), np.array([-1.0]))
 
