@@ -10,7 +10,7 @@ import numpy as np
 
 import fivebar_pin as fb
 from fivebar_pin import balancing, viz
-from fivebar_pin.io import mechanisms
+from fivebar_pin.shipped import mechanisms
 
 RATE, ACCELERATION = 5.0, -20.0  # of the crank [rad/s], [rad/s2]
 PERIOD = 2.0  # [s]

@@ -10,7 +10,7 @@ import numpy as np
 
 import fivebar_pin as fb
 from fivebar_pin import viz
-from fivebar_pin.io import mechanisms
+from fivebar_pin.shipped import mechanisms
 
 PERIOD = 1.0  # [s]
 SWING = 0.15  # amplitude of the hips [rad]

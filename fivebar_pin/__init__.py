@@ -7,8 +7,9 @@
     loads = fb.inverse_dynamics(chain, trajectory)      # torque, shaking force and moment, reactions
     design = fb.balance(chain, "force")                 # the optimal mass distribution, or the proof of none
 
-Sub-packages: `fb.paper` (the planar five-bar in closed form), `fb.balancing`, `fb.io`, `fb.viz`. Each is
-imported when it is first used, so that importing stays cheap and an interrupted command line can say so.
+Sub-packages: `fb.planar` (linkages in their own words), `fb.paper` (the planar five-bar in closed form),
+`fb.balancing`, `fb.shipped`, `fb.io`, `fb.viz`. Each is imported when it is first used, so that importing stays cheap
+and an interrupted command line can say so.
 """
 
 from __future__ import annotations
@@ -19,16 +20,17 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from fivebar_pin import balancing, io, motion, paper, viz
+    from fivebar_pin import balancing, closures, io, motion, paper, planar, shipped, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure, ClosureKind
     from fivebar_pin.diagnosis import Diagnosis, diagnose
-    from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics
+    from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics, reduced_dynamics
     from fivebar_pin.errors import FiveBarPinError
-    from fivebar_pin.io import load, save
-    from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive
+    from fivebar_pin.io import save
+    from fivebar_pin.kinematics import assemble, assembly_modes, closure_residual, complement, drive, frame_motion
     from fivebar_pin.motion import Motion
+    from fivebar_pin.planar.loading import load
     from fivebar_pin.simulation import simulate
     from fivebar_pin.springs import JointSpring, Spring
     from fivebar_pin.trajectory import Trajectory
@@ -53,19 +55,24 @@ __all__ = [
     "balance_conditions",
     "balancing",
     "closure_residual",
+    "closures",
     "complement",
     "diagnose",
     "drive",
     "energy_balance",
     "forward_dynamics",
+    "frame_motion",
     "inverse_dynamics",
     "io",
     "load",
     "motion",
     "paper",
     "pareto",
+    "planar",
+    "reduced_dynamics",
     "save",
     "score",
+    "shipped",
     "simulate",
     "viz",
 ]
@@ -75,12 +82,15 @@ _LATE = {
     "chain": ("ClosedChain", "Visual"),
     "closures": ("Closure", "ClosureKind"),
     "diagnosis": ("Diagnosis", "diagnose"),
-    "dynamics": ("Loads", "energy_balance", "forward_dynamics", "inverse_dynamics"),
+    "dynamics": ("Loads", "energy_balance", "forward_dynamics", "inverse_dynamics", "reduced_dynamics"),
     "errors": ("FiveBarPinError",),
-    "io": ("load", "save"),
-    "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive"),
+    "io": ("save",),
+    "kinematics": ("assemble", "assembly_modes", "closure_residual", "complement", "drive", "frame_motion"),
     "motion": ("Motion",),
     "paper": (),
+    "planar": (),
+    "planar.loading": ("load",),
+    "shipped": (),
     "simulation": ("simulate",),
     "springs": ("JointSpring", "Spring"),
     "trajectory": ("Trajectory",),

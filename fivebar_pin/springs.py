@@ -28,11 +28,16 @@ class Spring(Immutable):
     damping: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_numbers(f"spring {self.frame1}~{self.frame2}", self.stiffness, self.length, self.damping)
+        _check_numbers(f"spring {self.name}", self.stiffness, self.length, self.damping)
         if self.length < 0.0:
-            raise InvalidInputError(f"length of spring {self.frame1}~{self.frame2}", self.length, "must be >= 0 [m]")
+            raise InvalidInputError(f"length of spring {self.name}", self.length, "must be >= 0 [m]")
         if self.frame1 == self.frame2:
             raise InvalidInputError("spring frames", (self.frame1, self.frame2), "must differ")
+
+    @property
+    def name(self) -> str:
+        """What messages and reports call it."""
+        return f"{self.frame1}~{self.frame2}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +57,12 @@ class JointSpring(Immutable):
     damping: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_numbers(f"spring on {self.joint}", self.stiffness, self.rest, self.damping)
+        _check_numbers(f"spring {self.name}", self.stiffness, self.rest, self.damping)
+
+    @property
+    def name(self) -> str:
+        """What messages and reports call it."""
+        return f"on {self.joint}"
 
 
 def _check_numbers(name: str, stiffness: float, length: float, damping: float) -> None:

@@ -74,6 +74,7 @@ class Workplace:
             "many.csv": ",".join(f"c{k}" for k in range(3000)) + "\n",
             "digits.csv": f"t,q_x,v_x,a_x\n{'9' * 5000},0,0,0\n",
         }  # fmt: skip
+        texts["tree.urdf"] = fb.io.shipped_path("slider_crank").read_text()
         for name, text in texts.items():
             (place / name).write_text(text)
         (place / "noise.csv").write_bytes(bytes(range(256)))
@@ -127,7 +128,7 @@ class Workplace:
     def line(self) -> list[str]:
         """Return the words of one command."""
         command = self.random.choice(
-            ("demo", "check", "loads", "simulate", "conditions", "balance", "pareto", "score", "view", "other")
+            ("demo", "check", "close", "loads", "simulate", "conditions", "balance", "pareto", "score", "view", "other")
         )
         if command == "other":
             return [
@@ -136,6 +137,8 @@ class Workplace:
             ]
         options = getattr(self, f"_{command}")()
         positional = [] if command == "demo" else [self.path()]
+        if command == "close":
+            positional = [self.word(str(self.place / "tree.urdf"))]
         if command == "pareto":
             terms = ("added_mass", "rms_torque", "peak_torque", "rms_shaking_moment", "beauty")
             positional += [self.word(*terms), self.word(*terms)]
@@ -162,6 +165,13 @@ class Workplace:
 
     def _check(self) -> list[list[str]]:
         return []
+
+    def _close(self) -> list[list[str]]:
+        return [
+            ["--out", self.out()], ["--overwrite"], ["--kind", self.word("3d", "6d", "revolute")],
+            ["--pair", self.word("B_rod", "B_coupler"), self.word("B_slider", "B_rocker")],
+            ["--motor", self.word("crank", "psi", "slider")], ["--dry-run"],
+        ]  # fmt: skip
 
     def _loads(self) -> list[list[str]]:
         about = ["--about", *(self.number("0", "1") for _ in range(3))]

@@ -251,3 +251,20 @@ def double_four_bar() -> fb.ClosedChain:
         point(model, uprights[k + 1], f"upright{k + 1}_end", at(1.0))
         closures.append(fb.Closure((f"coupler{k}_end", f"upright{k + 1}_end"), "3d", name=f"pin{k}"))
     return fb.ClosedChain(model, closures, ("upright0",))
+
+
+def side_by_side(*lengths: Sequence[float], apart: float = 3.0, tilt: pin.SE3 = AT_ORIGIN) -> fb.ClosedChain:
+    """Return planar four-bars in one model that share nothing but the ground, `apart` from each other [m]."""
+    model = pin.Model()
+    model.name = "side_by_side"
+    closures, cranks = [], []
+    for k, (a, b, c, d) in enumerate(lengths):
+        base = tilt * at(apart * k)
+        crank = add(model, 0, pin.JointModelRZ(), base, f"crank{k}", body(3 * k + 1))
+        coupler = add(model, crank, pin.JointModelRZ(), at(a), f"coupler{k}", body(3 * k + 2))
+        rocker = add(model, 0, pin.JointModelRZ(), base * at(d), f"rocker{k}", body(3 * k + 3))
+        point(model, coupler, f"coupler_end{k}", at(b))
+        point(model, rocker, f"rocker_end{k}", at(c))
+        closures.append(fb.Closure((f"coupler_end{k}", f"rocker_end{k}"), "3d", name=f"pin{k}"))
+        cranks.append(f"crank{k}")
+    return fb.ClosedChain(model, tuple(closures), tuple(cranks))

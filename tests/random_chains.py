@@ -81,10 +81,12 @@ def assert_same(first: ClosedChain, second: ClosedChain, rtol: float = 1e-15) ->
     for word in (*VECTORS, *LOSSES):
         np.testing.assert_array_equal(getattr(b, word), getattr(a, word), err_msg=word)
     np.testing.assert_array_equal(b.gravity.linear, a.gravity.linear)
-    assert [(c.name, c.frames, c.kind) for c in second.closures] == [(c.name, c.frames, c.kind) for c in first.closures]
+    assert [(c.name, c.joins, c.kind) for c in second.closures] == [(c.name, c.joins, c.kind) for c in first.closures]
     for c, d in zip(first.closures, second.closures, strict=True):
-        np.testing.assert_allclose(d.axis, c.axis, rtol=0.0, atol=rtol)
-        for name in c.frames:
+        assert c.values().keys() == d.values().keys()
+        for key, value in c.values().items():
+            np.testing.assert_allclose(d.values()[key], value, rtol=0.0, atol=rtol)
+        for name in c.ends:
             f, g = (m.frames[m.getFrameId(name)] for m in (a, b))
             assert f.parentJoint == g.parentJoint
             np.testing.assert_allclose(g.placement.homogeneous, f.placement.homogeneous, rtol=0.0, atol=2 * rtol)

@@ -60,12 +60,22 @@ def test_what_is_left_out_is_counted_and_the_evidence_stays_whole() -> None:
 
 @pytest.mark.parametrize(
     ("value", "low", "high"),
-    [(0, 1, None), (-1, 0, None), (HUGE, 0, 9), (1.0, 0, None), (True, 0, None), ("3", 0, None), (None, 0, None)],
+    [
+        (0, 1, None),
+        (-1, 0, None),
+        (10, 0, 9),
+        (HUGE, 0, 9),
+        (1.0, 0, None),
+        (True, 0, None),
+        ("3", 0, None),
+        (None, 0, None),
+    ],
 )
 def test_integers_out_of_bounds_are_refused(value: object, low: int, high: int | None) -> None:
     with pytest.raises(InvalidInputError, match=r"count = .* must be an integer"):
         integer("count", value, least=low, most=high)
     assert integer("count", np.int32(5), least=low) == 5
+    assert integer("count", 9, least=9, most=9) == 9
 
 
 def test_integers_out_of_bounds_are_refused_where_they_are_given(chain: fb.ClosedChain) -> None:

@@ -239,7 +239,7 @@ def calls() -> dict[str, Callable[..., object]]:
         "forward q": lambda x, y: fb.forward_dynamics(chain, x, v, y),
         "simulate": lambda x, y: fb.simulate(chain, q, v, x, t[:2], max_steps=50),
         "simulate t": lambda x, y: fb.simulate(chain, q, x, None, y, max_steps=50),
-        "springs": lambda x, y: fb.forward_dynamics(chain, q, v, springs=[fb.JointSpring(first, x, y)]),
+        "springs": lambda x, y: fb.forward_dynamics(chain.with_springs([fb.JointSpring(first, x, y)]), q, v),
         "gravity": lambda x, y: chain.with_gravity(x),
         "parameters": lambda x, y: chain.with_inertial_parameters(x),
         "closure": lambda x, y: fb.Closure(x, y, x),

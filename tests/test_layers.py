@@ -26,7 +26,7 @@ ORDER = (
     ("mechanism",),
     ("kinematics", "dynamics"),
     ("simulation", "diagnosis", "balancing", "io", "paper"),
-    ("shipped",),
+    ("shipped", "planar"),
     ("viz",),
     ("cli",),
     ("__main__",),
@@ -34,7 +34,7 @@ ORDER = (
 MOST_FLOORS = 10
 PAPER_USES = {"errors", "_arrays", "chain", "closures", "motion", "trajectory", "paper"}
 HEAVY = ("scipy.optimize", "scipy.interpolate", "matplotlib", "meshcat", "cvxpy", "clarabel", "yaml", "rich", "typer")
-MOST_NAMES = 35
+MOST_NAMES = 40
 MOST_AT_THE_TOP = 5
 
 

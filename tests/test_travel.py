@@ -20,6 +20,7 @@ import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
+import fivebar_pin.chain
 from fivebar_pin import balancing, errors, paper
 from fivebar_pin._arrays import Immutable
 from fivebar_pin.balancing import objectives, solvers
@@ -40,6 +41,7 @@ WAYS = {
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
 }
+ABSTRACT = (fb.Closure, fb.closures.Anchored, fb.closures.FrameClosure)  # of which no value is made
 WORKSHOPS = (
     "walk",
     "sampling",
@@ -52,6 +54,16 @@ WORKSHOPS = (
 ELLIPSOID = balancing.Ellipsoid((0.1, 0.2, 0.3))
 INNER = ("viz", "cli", "io", "__main__", *(f"balancing.{m}" for m in WORKSHOPS))  # whose values no result holds
 EXAMPLES = {"float": 1.5e-3, "int | None": 7, "float | None": 0.25, "Iterable[str]": ("a", "b"), "object": "motor 1"}
+
+
+CLOSURES = (
+    fb.Closure(("a", "b")),
+    fb.Closure(("a", "b"), "6d"),
+    fb.Closure(("a", "b"), "revolute", axis=(0.0, 1.0, 2.0), name="hinge"),
+    fb.Closure(("a", "b"), "cylindrical", axis=(0.0, 1.0, 2.0)),
+    fb.Closure(("a", "b"), "distance", length=0.7),
+    fb.Closure(("a", "b"), "coupling", ratio=(1.0, 3.7), offset=0.2),
+)
 
 
 class Strange(errors.AssemblyError):
@@ -138,7 +150,8 @@ def modules() -> Iterator[object]:
 def public_values() -> frozenset[type]:
     """Return every dataclass that a module of the library offers under its `__all__`."""
     offered = [getattr(m, name) for m in modules() for name in getattr(m, "__all__", ())]
-    return frozenset(x for x in offered if is_dataclass(x) and isinstance(x, type) and x.__dataclass_params__.frozen)
+    made = [x for x in offered if is_dataclass(x) and isinstance(x, type) and x not in ABSTRACT]
+    return frozenset(x for x in made if x.__dataclass_params__.frozen)
 
 
 @cache
@@ -191,9 +204,17 @@ def specimens() -> tuple[object, ...]:
         paper.audit_table_1(),
         paper.errata(),
         loads.reactions,
+        fb.diagnosis.propose_closures(fb.ClosedChain(five.model, (), ())),
+        fb.diagnosis.propose_motors(five),
+        fb.frame_motion(chain, trajectory, "coupler_end"),
     )
+    bodies = (fb.chain.BarBody(("a", "b"), 0.5), fb.chain.LumpBody(("a",), 1.0))
+    plate = fb.chain.PlateBody(("a", "b", "c"), 2700.0, 0.01)
+    elbow = fb.chain.Placement("elbow", (("l", np.eye(6)[0]),))
+    own += (fb.chain.Geometry({"l": 0.3}, (elbow,), (*bodies, plate), ("l",)),)
     return (
         *(chain, motion, trajectory, loads, free, energy, linkage, five, solution, problem, design, none, front, score),
+        *CLOSURES,
         *(both, *regions, *more, *own, fb.Visual("crank_body", "sphere", (0.1,)), Spring("a", "b", 1.0, 0.5)),
         *(JointSpring("a", 1.0, 0.0), paper.compare_complements(linkage, moved, mode="left")),
     )

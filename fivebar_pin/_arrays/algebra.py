@@ -54,6 +54,38 @@ def _blocks(A: Array) -> list[tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]]
     return [(part[part < m], part[part >= m] - m) for part in parts]
 
 
+def inverse(M: Array) -> tuple[Array, Array]:
+    """Invert a batch of square matrices; singular ones become nan. Also return the determinants."""
+    if M.shape[-1] == 2:
+        return _inverse_of_two(M)
+    return _inverse(M), np.asarray(np.linalg.det(M))
+
+
+def _inverse_of_two(M: Array) -> tuple[Array, Array]:
+    """The usual case of one planar loop in closed form: by the cofactors, far cheaper than a factorisation."""
+    det = M[:, 0, 0] * M[:, 1, 1] - M[:, 0, 1] * M[:, 1, 0]
+    with np.errstate(divide="ignore"):
+        scale = np.where(det == 0.0, np.nan, 1.0 / det)
+    X = np.empty_like(M)
+    X[:, 0, 0], X[:, 1, 1] = M[:, 1, 1] * scale, M[:, 0, 0] * scale
+    X[:, 0, 1], X[:, 1, 0] = -M[:, 0, 1] * scale, -M[:, 1, 0] * scale
+    return X, det
+
+
+def _inverse(M: Array) -> Array:
+    """Invert a batch of square matrices by factorisation; singular ones become nan."""
+    try:
+        return np.asarray(np.linalg.inv(M))
+    except np.linalg.LinAlgError:
+        out = np.full_like(M, np.nan)
+        for i, Mi in enumerate(M):
+            try:
+                out[i] = np.linalg.inv(Mi)
+            except np.linalg.LinAlgError:
+                continue
+        return out
+
+
 def skew(x: Array) -> Array:
     """Return [x]× with [x]× y = x × y.  x (..., 3) -> (..., 3, 3)."""
     S = np.zeros((*x.shape, 3))

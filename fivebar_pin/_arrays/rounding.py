@@ -12,6 +12,13 @@ ROUND_OFF = 2.0**-40
 """Share of what adds up to a number that round-off may leave of it: 4096 units in the last place, as loops are closed
 to some hundred of them and a chain of solved equations adds to that [-]."""
 
+TINY = 1e-300
+"""Least divisor: smaller than any size met, so that a quotient of nothing by nothing is nothing [any unit]."""
+
+
+TINY = 1e-300
+"""Least divisor: x / max(y, TINY) is huge where y is zero, and no number is none [any unit]."""
+
 
 def table_text(header: str, body: Array) -> str:
     """Return a table (n, k) as csv text below a header line, every digit kept."""

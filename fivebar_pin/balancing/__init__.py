@@ -10,7 +10,7 @@ moment m c and inertia about the joint origin, in one vector pi. Along any motio
     linear momentum p = Y_p(q, v) pi,       angular momentum L = Y_L(q, v) pi,
     shaking force and moment                F = -dp/dt = Y_F(q, v, a) pi,     M = -dL/dt = Y_M(q, v, a) pi,
     frame force and moment                  the same with the weight,
-    motor torque                            tau = N^T Y_t(q, v, a) pi + (friction, rotors),
+    motor torque                            tau = N^T Y_t(q, v, a) pi + (friction, rotors, springs),
 
 and so are joint reactions and energies: none of these matrices knows the masses (`regressor`). N is the complement,
 v = N v_a. The closures enter through N alone, so nothing below depends on the kind of mechanism.
@@ -21,8 +21,9 @@ a given q momentum is linear in v_a, so it is enough to ask it for the unit velo
 
     Y_p(q, N(q) e_k) pi = 0    for all closed q, all k        ("force")
     Y_L(q, N(q) e_k) pi = 0    the same for moments           ("moment"; both: "dynamic")
-    g . Y_p(q, N(q) e_k) pi = 0                               ("static": no gravity torque N^T dV/dq)
+    g . Y_p(q, N(q) e_k) pi + f(q) . N(q) e_k = 0             ("static": no torque at rest, with f by springs)
 
+Springs are inner forces and play a part in the last alone, as constants: B pi + b = 0.
 Rows for a few hundred random q are stacked and their row space B taken from a singular value decomposition. Lengths are
 divided by the chain's own, masses do not enter, and the gap between the singular values that count and those that do
 not is reported. A planar mechanism feels four parameters per body, (m, m c_x, m c_y, I): the four-bar has 4 conditions

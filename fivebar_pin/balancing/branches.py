@@ -72,7 +72,7 @@ def branches(
             own = balance_conditions(chain, together.kind, gravity=gravity, about=about, near=q, space=space, seed=seed)
         except FiveBarPinError:
             continue  # a stretch too short to decide a rank: nothing to be gained there
-        if own.rank < together.rank and not any(_alike(own, b.conditions) for b in found):
+        if _asked(own) < _asked(together) and not any(_alike(own, b.conditions) for b in found):
             found.append(Branch(frozen(q), own, k < len(named)))
     return tuple(sorted(found, key=lambda b: (not b.named, b.conditions.rank)))
 
@@ -84,8 +84,15 @@ def configurations_meant(chain: ClosedChain, motions: Motions) -> tuple[Array, .
     return starts or tuple(q for q in chain.references.values() if closed_at(loops_of(chain), q))
 
 
+def _asked(conditions: BalanceConditions) -> tuple[bool, int]:
+    """Return what tells how much conditions ask: whether the impossible, and how many there are."""
+    return bool(conditions.unheld), conditions.rank
+
+
 def _alike(a: BalanceConditions, b: BalanceConditions) -> bool:
-    if a.rank != b.rank:
+    if _asked(a) != _asked(b):
         return False
     outside = a.basis - (a.basis @ b.basis.T) @ b.basis
-    return bool(np.abs(outside).max(initial=0.0) < _ROUGH)
+    constants = a.offset - a.basis @ b.basis.T @ b.offset
+    size = max(float(np.abs(a.offset).max(initial=0.0)), 1e-300)
+    return bool(np.abs(outside).max(initial=0.0) < _ROUGH and np.abs(constants).max(initial=0.0) < _ROUGH * size)

@@ -6,7 +6,7 @@ zero for every closed configuration q and every actuated velocity, so the condit
     Y_k(q) pi = 0,     Y_k(q): momentum regressor at the velocity N(q) e_k,     k = 1 .. na,
 
 over samples q of the constraint manifold. Lengths are divided by the chain's length and masses drop out, so no rank
-depends on the units.
+depends on the units. Springs add constants to the conditions of static balance, B pi + b = 0 (`_at_rest`).
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integer, skew
 from fivebar_pin.balancing.parameters import Space, plane_axes
 from fivebar_pin.balancing.regressors.body_motion import BodyMotion
 from fivebar_pin.balancing.sampling import Samples, SpaceName, random_samples, space_of
-from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.closures import Closure
+from fivebar_pin.balancing.static import held, required_gravity, same_springs, spring_rows, springs_act
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.closures import Anchored
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
 
@@ -48,7 +48,7 @@ _ALIKE = 1e-9  # difference up to which directions [-], points, placements and c
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class BalanceConditions(Immutable):
-    """Linear conditions on the inertial parameters under which a chain is balanced.
+    """Linear conditions on the inertial parameters under which a chain is balanced; affine where springs are held.
 
     Attributes:
         chain: the mechanism.
@@ -62,9 +62,13 @@ class BalanceConditions(Immutable):
         singular_values: of the stacked regressor, scaled, relative to the largest.
         gap: ratio of the last singular value that counts to the first that does not.
         samples: number of configurations used.
-        gravity: direction (3,) that static conditions hold for, or None for any.
+        gravity: acceleration (3,) that static conditions hold for, or None for any [m/s2]; its size plays a part only
+            where springs do.
         about: point (3,) of the angular momentum [m].
         near: closed configuration (nq,) whose branch alone they hold on, or None for all assembly modes.
+        offset: constants (rank,) of the affine conditions basis x + offset = 0, zero without springs [kg].
+        unheld: torque of the springs that no masses hold, its root mean square over the sampled configurations at unit
+            velocity, over gravity and the chain's length; zero where some do [kg].
     """
 
     chain: ClosedChain
@@ -81,12 +85,14 @@ class BalanceConditions(Immutable):
     gravity: Array | None
     about: Array
     near: Array | None
+    offset: Array
+    unheld: float
 
     def __repr__(self) -> str:
         where = "planar" if self.space.planar else "spatial"
         return (
             f"BalanceConditions({self.chain.name!r}, {self.kind}: rank {self.rank} of {self.basis.shape[1]} {where} "
-            f"parameters, gap {self.gap:.1e})"
+            f"parameters, gap {self.gap:.1e}{', impossible with these springs' if self.unheld else ''})"
         )
 
     def __str__(self) -> str:
@@ -99,14 +105,24 @@ class BalanceConditions(Immutable):
 
     @property
     def equations(self) -> tuple[str, ...]:
-        """The reduced form in words, SI units: which link's mass, first moments and inertia enter with what factor."""
-        names = self.space.names
-        return tuple(_equation(row, names) for row in self.reduced)
+        """The reduced form in words, SI units: which link's mass, first moments and inertia enter with what factor.
+
+        Where no masses hold the springs, the last one says so.
+        """
+        names, constants = self.space.names, self.constants(self.reduced * self.space.scale)
+        real = np.abs(self.constants(self.rows)) > _ALIKE * np.abs(self.offset).max(initial=0.0)
+        found = tuple(_equation(row, names, c) for row, c in zip(self.reduced, real * constants, strict=True))
+        return (*found, f"{self.unheld:.4g} (springs, whatever the masses) = 0") if self.unheld else found
+
+    def constants(self, rows: Array) -> Array:
+        """Return the constants c of combinations of the conditions, rows x + c = 0 on scaled parameters (k, P) [kg]."""
+        return np.asarray(rows @ self.basis.T @ self.offset)
 
     def residual(self, chain: ClosedChain | npt.ArrayLike | None = None) -> Array:
         """Return the rows at a chain, or at parameters (nb, 10): zero when balanced (rank,) [kg].
 
-        First moments count as masses at the chain's length, inertias as masses at its square.
+        First moments count as masses at the chain's length, inertias as masses at its square. Where no masses hold the
+        springs, `unheld` is one entry more.
         """
         if chain is None or isinstance(chain, ClosedChain):
             pi = (self.chain if chain is None else chain).inertial_parameters
@@ -114,7 +130,8 @@ class BalanceConditions(Immutable):
             pi = checked("parameters", chain, (None, 10))
         if pi.size != self.matrix.shape[1]:
             raise InvalidInputError("parameters", pi.shape, f"must belong to {len(self.space.bodies)} bodies")
-        return np.asarray(self.matrix @ pi.reshape(-1))
+        left = self.matrix @ pi.reshape(-1) + self.offset
+        return np.append(left, self.unheld) if self.unheld else np.asarray(left)
 
     def angles(self, equations: npt.ArrayLike) -> Array:
         """Return the principal angles [rad] between these conditions and other equations on the same parameters.
@@ -145,8 +162,10 @@ def balance_conditions(
     Args:
         chain: the mechanism; its present masses play no part.
         kind: "force" (centre of mass stationary), "moment" (angular momentum about `about` constant), "dynamic"
-            (both) or "static" (no gravity torque at the actuated joints).
-        gravity: for "static": "any" direction, the model's own, or a vector (3,).
+            (both) or "static" (no torque at the actuated joints at rest, from gravity and the chain's springs
+            together). Springs play no part in the others: they are inner forces.
+        gravity: for "static": "any" direction, the model's own, or a vector (3,); with springs that act its size
+            matters too [m/s2].
         about: point (3,) of the angular momentum; plays no part when the force is balanced too.
         near: closed configuration (nq,): balance only the branch that it can reach. By default the conditions hold on
             every assembly mode; they differ only for special lengths (parallelograms and the like).
@@ -159,6 +178,7 @@ def balance_conditions(
 
     Raises:
         UnknownNameError: a kind that does not exist.
+        InvalidInputError: static balance of springs under "any" gravity.
         AssemblyError: too few configurations close.
         SolverError: the singular values show no clear gap, however many samples are taken.
     """
@@ -168,14 +188,20 @@ def balance_conditions(
     count = integer("samples", wanted, least=10, most=_MOST_SAMPLES)
     integer("seed", seed)
     point = checked("about", about, (3,))
-    direction = _direction(chain, gravity) if kind == "static" else None
+    weight = _gravity(chain, gravity) if kind == "static" else None
     drawn = random_samples(chain, int(count), near=near, seed=seed)
     found = space_of(chain, drawn, space)
-    used, stacked, R = 0, 0, np.zeros((0, found.scale.size))
+    acting = kind == "static" and springs_act(chain, drawn)
+    pull = required_gravity(chain, weight) if acting else 1.0
+    P = found.scale.size
+    used, stacked, R, parts = 0, 0, np.zeros((0, P + acting)), 0.0
     for _ in range(_DOUBLINGS + 1):
-        rows = _rows(chain, drawn, found, kind, direction, point)
+        rows = _rows(chain, drawn, found, kind, weight, point)
+        if acting:
+            column, sizes = (x / (pull * found.length) for x in spring_rows(chain, drawn))
+            rows, parts = np.column_stack([rows, column]), float(np.hypot(parts, np.linalg.norm(sizes)))
         used, stacked, R = used + len(drawn), stacked + rows.shape[0], _triangle(R, rows)
-        _, s, Vt = np.linalg.svd(R)
+        U, s, Vt = np.linalg.svd(R[:, :P])
         rank, gap = _gap(s)
         if not rank or (gap >= _CLEAR and stacked > rank):
             break
@@ -188,7 +214,9 @@ def balance_conditions(
             residual=gap,
             tolerance=_CLEAR,
         )
-    return _conditions(chain, kind, found, s, Vt[:rank], gap, used, direction, point, near)
+    offset, outside = held(U, s, rank, R[:, P], parts) if acting else (np.zeros(rank), 0.0)
+    unheld = outside / float(np.sqrt(stacked))
+    return _conditions(chain, kind, found, s, Vt[:rank], gap, used, weight, point, near, offset, unheld)
 
 
 def conditions_for(
@@ -222,8 +250,12 @@ def conditions_for(
         raise InvalidInputError("conditions", given, f"must be {space}")
     if near is not None and not _close(given.near, checked("near", near, (chain.nq,))):
         raise InvalidInputError("conditions", given, "must be those of the branch of near")
-    if kind == "static" and not _close(given.gravity, _direction(chain, gravity)):
-        raise InvalidInputError("conditions", given, f"must hold for gravity = {gravity!r}")
+    if kind == "static":
+        sprung = bool(given.unheld or given.offset.any())
+        if not _same_gravity(given.gravity, _gravity(chain, gravity), sized=sprung):
+            raise InvalidInputError("conditions", given, f"must hold for gravity = {gravity!r}")
+        if not same_springs(chain, given.chain):
+            raise InvalidInputError("conditions", given, f"must hold the springs of {chain.name}")
     if kind == "moment" and not _close(given.about, checked("about", about, (3,))):
         raise InvalidInputError("conditions", given, f"must be about {about!r}")
     return given
@@ -233,6 +265,14 @@ def _close(a: Array | None, b: Array | None) -> bool:
     if a is None or b is None:
         return a is b
     return bool(np.abs(a - b).max(initial=0.0) <= _ALIKE)
+
+
+def _same_gravity(a: Array | None, b: Array | None, *, sized: bool) -> bool:
+    """Whether two accelerations have the same direction, and the same size where it matters."""
+    if a is None or b is None:
+        return a is b
+    one, two = float(np.linalg.norm(a)), float(np.linalg.norm(b))
+    return _close(a / one, b / two) and (not sized or abs(one - two) <= _ALIKE * one)
 
 
 def _same_mechanism(a: ClosedChain, b: ClosedChain) -> bool:
@@ -246,13 +286,12 @@ def _same_mechanism(a: ClosedChain, b: ClosedChain) -> bool:
         M.isApprox(W, _ALIKE) and j == k
         for M, W, j, k in zip(one.jointPlacements, two.jointPlacements, one.joints, two.joints, strict=True)
     )
-    return tree and all(_same_closure(one, c, two, d) for c, d in zip(a.closures, b.closures, strict=True))
+    pairs = zip(loops_of(a).anchored, loops_of(b).anchored, strict=True)
+    return tree and all(_same_closure(c, d) for c, d in pairs)
 
 
-def _same_closure(one: pin.Model, c: Closure, two: pin.Model, d: Closure) -> bool:
-    frames = [(find_frame(one, f), find_frame(two, g)) for f, g in zip(c.frames, d.frames, strict=True)]
-    alike = all(f.parentJoint == g.parentJoint and f.placement.isApprox(g.placement, _ALIKE) for f, g in frames)
-    return alike and c.kind is d.kind and _close(np.asarray(c.axis), np.asarray(d.axis))
+def _same_closure(c: Anchored, d: Anchored) -> bool:
+    return c.closure.kind == d.closure.kind and c.tied == d.tied and _close(c.numbers(), d.numbers())
 
 
 def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Array) -> tuple[Array, Array]:
@@ -276,8 +315,8 @@ def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Arr
     return np.concatenate(linear), np.concatenate(angular)
 
 
-def _direction(chain: ClosedChain, gravity: npt.ArrayLike | str) -> Array | None:
-    """Return the unit direction of gravity, or None for any."""
+def _gravity(chain: ClosedChain, gravity: npt.ArrayLike | str) -> Array | None:
+    """Return the acceleration of gravity (3,) [m/s2], or None for any."""
     if isinstance(gravity, str):
         if gravity == "any":
             return None
@@ -285,10 +324,9 @@ def _direction(chain: ClosedChain, gravity: npt.ArrayLike | str) -> Array | None
             raise UnknownNameError("gravity", gravity, ("any", "model", "a vector of three"))
         gravity = np.array(chain.model.gravity.linear)
     g = checked("gravity", gravity, (3,))
-    size = float(np.linalg.norm(g))
-    if size == 0.0:
+    if float(np.linalg.norm(g)) == 0.0:
         raise InvalidInputError("gravity", g.tolist(), "must not be zero for static balance")
-    return np.asarray(g / size)
+    return g
 
 
 def _rows(chain: ClosedChain, samples: Samples, space: Space, kind: str, gravity: Array | None, about: Array) -> Array:
@@ -296,7 +334,7 @@ def _rows(chain: ClosedChain, samples: Samples, space: Space, kind: str, gravity
     linear, angular = momentum_rows(chain, samples, space, about)
     if kind == "static" and gravity is not None:  # N^T g(q) = -g . (linear momentum at N e_k)
         axes = np.eye(3) if space.normal is None else plane_axes(space.normal)[:2]
-        linear = np.matmul(axes @ gravity, linear)[:, None]
+        linear = np.matmul(axes @ (gravity / float(np.linalg.norm(gravity))), linear)[:, None]
     parts = {"force": [linear], "static": [linear], "moment": [angular], "dynamic": [linear, angular]}[kind]
     return np.concatenate([p.reshape(-1, p.shape[-1]) for p in parts])
 
@@ -318,6 +356,8 @@ def _conditions(
     gravity: Array | None,
     about: Array,
     near: npt.ArrayLike | None,
+    offset: Array,
+    unheld: float,
 ) -> BalanceConditions:
     echelon = _echelon(basis, space)
     return BalanceConditions(
@@ -335,6 +375,8 @@ def _conditions(
         gravity=None if gravity is None else frozen(gravity),
         about=frozen(about),
         near=None if near is None else frozen(np.array(near, dtype=np.float64)),
+        offset=frozen(offset),
+        unheld=unheld,
     )
 
 
@@ -386,10 +428,12 @@ def _tidy(x: float) -> float:
     return simple if abs(simple - x) < _SIMPLE * max(abs(x), _LEAST_FACTOR) else x
 
 
-def _equation(row: Array, names: Sequence[str]) -> str:
+def _equation(row: Array, names: Sequence[str], constant: float = 0.0) -> str:
     terms: list[str] = []
     for k in sorted((int(i) for i in np.flatnonzero(row)), key=lambda k: (row[k] != 1.0, k)):
         factor = f"{abs(row[k]):.10g} " if abs(row[k]) != 1.0 else ""
         sign = ("-" if row[k] < 0 else "") if not terms else (" - " if row[k] < 0 else " + ")
         terms.append(f"{sign}{factor}{names[k]}")
+    if constant:
+        terms.append(f" {'-' if constant < 0.0 else '+'} {abs(constant):.10g}")
     return "".join(terms) + " = 0"

@@ -178,9 +178,13 @@ def _present(setting: Setting, parts: Sequence[Placed]) -> Array:
 def _constraints(setting: Setting, parts: Sequence[Placed], E: Array, X0: Array) -> list[Block]:
     """Return conditions, what the parts ask, and what the user asks of them."""
     n, blocks, conditions = E.shape[1], [], setting.conditions
-    if conditions is not None and conditions.rank:
-        labels = tuple(f"[{text}]" for text in conditions.equations)
-        blocks.append(Block(labels, "zero", conditions.rows @ E, conditions.rows @ X0))
+    if conditions is not None and conditions.equations:
+        R, labels = conditions.rows, tuple(f"[{text}]" for text in conditions.equations)
+        held = conditions.constants(R) / setting.mass  # what springs ask of the masses, none without springs
+        if len(R):
+            blocks.append(Block(labels[: len(R)], "zero", R @ E, R @ X0 + held))
+        if conditions.unheld:
+            blocks.append(Block(labels[-1], "zero", np.zeros((1, n)), np.array([conditions.unheld / setting.mass])))
     blocks += [p.widened(block, n) for p in parts for block in p.part.cones]
     return blocks + [p.widened(block, n) for p in parts for block in p.part.bounds(setting)]
 

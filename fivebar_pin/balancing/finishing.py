@@ -51,8 +51,9 @@ def exact(form: ConicForm, y: Array, drop: float) -> tuple[Array, float]:
     """
     conditions = form.setting.conditions
     B = np.zeros((0, form.X0.size)) if conditions is None else conditions.basis
+    held = np.zeros(len(B)) if conditions is None else conditions.offset / form.setting.mass
     A = np.concatenate([B @ form.E, form.fixed[:, :-1]])
-    b = np.concatenate([B @ form.X0, -form.fixed[:, -1]])
+    b = np.concatenate([B @ form.X0 + held, -form.fixed[:, -1]])
     mass = np.array([p.part.share(y[p.where]) for p in form.parts])
     share = np.where((mass < drop) | np.array(form.gone), 0.0, np.maximum(mass, _LEAST_SHARE))
     share = np.repeat(share, [p.part.size for p in form.parts])

@@ -3,7 +3,7 @@
 With x the parameters of the mechanism and delta, rho the material added and removed,
 
     x = x_0 + delta - rho,     delta, rho, x_0 - rho physical, delta and rho within their regions
-    B x = 0                    the balancing conditions
+    B x + b = 0                the balancing conditions, b = 0 without springs
 
 or x itself physical, within its region and within mass bounds (redesign). Every term of the objective is linear in x
 or a length of a vector linear in x, so the problem is a conic one: its optimum is global, its dual bounds it from

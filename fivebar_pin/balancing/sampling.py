@@ -14,12 +14,15 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, frozen
 from fivebar_pin.balancing.parameters import Space, plane_axes
-from fivebar_pin.balancing.walk import HELD, Ground, Walk, ground
+from fivebar_pin.balancing.walk import Ground, Walk, ground
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
+from fivebar_pin.mechanism.closing import Limits, polish, residual_of, search
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.newton import Limits, polish, residual_of, search
 from fivebar_pin.mechanism.per_chain import once_per_chain
+from fivebar_pin.mechanism.plane import plane_normal
+from fivebar_pin.mechanism.rank import HELD
 from fivebar_pin.mechanism.tree import Poses
 
 __all__ = ["Samples", "SpaceName", "closed_at", "random_samples", "space_of"]
@@ -101,31 +104,13 @@ def space_of(chain: ClosedChain, samples: Samples, space: SpaceName = "auto") ->
     if space not in ("auto", "planar", "spatial"):
         raise UnknownNameError("space", space, ("auto", "planar", "spatial"))
     nb = chain.model.njoints - 1
-    normal = None if space == "spatial" else _normal(samples.poses.S, chain.length)
+    normal = None if space == "spatial" else plane_normal(samples.poses.S, chain.length)
     if normal is None:
         if space == "planar":
             raise InvalidInputError("space", space, f"{chain.name} does not move in parallel planes")
         return Space(chain.joints, None, frozen(np.broadcast_to(np.eye(3), (nb, 3, 3))), chain.length)
     axes = [plane_axes(samples.poses.R[j][0].T @ normal) for j in range(1, nb + 1)]
     return Space(chain.joints, frozen(normal), frozen(axes), chain.length)
-
-
-def _normal(S: Array, length: float, tolerance: float = 1e-9) -> Array | None:
-    """Return the common normal of the motion, or None.  S (n, 6, nv)."""
-    columns = np.moveaxis(S, 1, 2).reshape(-1, 6)
-    angular = columns[:, 3:]
-    turning = angular[np.linalg.norm(angular, axis=1) > tolerance]
-    if not turning.size:
-        return None
-    n = turning[0] / np.linalg.norm(turning[0])
-    k = int(np.argmax(np.abs(n)))
-    n = n * np.sign(n[k])
-    if np.linalg.norm(np.cross(angular, n), axis=1).max() > tolerance:
-        return None
-    if np.abs(columns[:, :3] @ n).max() > tolerance * max(1.0, length):
-        return None
-    snapped = np.where(np.abs(n) < 1e-12, 0.0, n)
-    return np.asarray(snapped / np.linalg.norm(snapped))
 
 
 class _Shelf:
@@ -207,8 +192,8 @@ class _Draw:
                 q = search(loops, starts, columns=np.arange(loops.tree.nv), limits=self._limits, iterations=_SEARCH)
                 self._note(q)
                 q = polish(loops, q).q
-            here = ground(loops, q)
-            good = here.regular() & (here.control > HELD) & self._limits.inside(loops, q)
+            here = ground(Configurations(loops, q))
+            good = here.sound & (here.control > HELD) & self._limits.inside(loops, q)
             if loops.m:
                 good &= ~loops.opposed(loops.pairs(loops.tree.poses(q)))
             self._tried += starts.shape[0]
@@ -257,7 +242,7 @@ class _Draw:
                 bound = f"must lie within its limits [{low:.6g}, {high:.6g}]"
                 raise InvalidInputError(f"actuated joint {joint} in near", float(value), bound)
         self._tried = 1
-        return ground(loops, q)
+        return ground(Configurations(loops, q))
 
     def _too_few(self, wanted: int) -> AssemblyError:
         name, size = self._open

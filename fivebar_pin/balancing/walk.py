@@ -14,16 +14,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.mechanism.loops import Loops, inverse
-from fivebar_pin.mechanism.newton import Limits
+from fivebar_pin.mechanism.closing import Limits, iterate
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.loops import Loops
+from fivebar_pin.mechanism.rank import BRANCHING, HELD, TIED
 
-__all__ = ["HELD", "Ground", "Walk", "close", "ground"]
+__all__ = ["Ground", "Walk", "close", "ground"]
 
-HELD = 1e-6  # scaled smallest singular value of the passive columns where the motors still hold the mechanism [-]
-_REGULAR = 1e-3  # scaled smallest singular value of all columns where the mechanism does not branch [-]
 _LONGEST, _SHORTEST = 0.7, 1e-4  # steps of a walk [rad, or chain lengths]
 _CAREFUL = 0.2  # longest step of a careful walk over the smallest singular value [rad, or chain lengths]
-_TIED = 1e-6  # scaled closure rate that velocities along the tangent may have left [-]
 _CLOSED = 1e-11  # scaled closure residual of a closed configuration [rad, or chain lengths]
 _NEARLY = 1e-9  # scaled residual below which one more Newton step reaches round-off [rad, or chain lengths]
 _NEWTON = 8  # steps of Newton's method
@@ -32,33 +31,23 @@ _DETOUR, _FREE = 0.4, 0.01  # longest way back to the closures, as a share of a 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground(Immutable):
-    """Where a batch of walkers stands.
+    """Where a batch of walkers stands, as far as they need it.
 
     Attributes:
         q: configurations (n, nq).
-        residual: largest closure row, scaled (n,).
-        reduced: independent combinations of the rows, scaled (n, r).
         T: orthonormal tangent space, scaled (n, nv, na).
-        back: pseudo-inverse of the scaled Jacobian (n, nv, r).
         sigma: lower estimate of the smallest singular value of the scaled Jacobian (n,).
-        tied: scaled rate of the closures along T (n,); above round-off where the actuated joints are too many.
+        sound: whether it is closed and the mechanism does not branch (n,) of bool.
         control: the same estimate as sigma for the passive columns alone (n,).
         sign: sign of the determinant of these, per group of closures (n, groups).
     """
 
     q: Array
-    residual: Array
-    reduced: Array
     T: Array
-    back: Array
     sigma: Array
-    tied: Array
+    sound: npt.NDArray[np.bool_]
     control: Array
     sign: Array
-
-    def regular(self) -> npt.NDArray[np.bool_]:
-        """Return where it is closed and the mechanism does not branch (n,)."""
-        return np.asarray((self.residual <= _CLOSED) & (self.sigma > _REGULAR) & (self.tied < _TIED))
 
     def replaced(self, where: npt.NDArray[np.bool_], other: Ground) -> Ground:
         """Return the same with some walkers (n,) moved to where others stand."""
@@ -73,60 +62,48 @@ class Ground(Immutable):
         return Ground(**{name: getattr(self, name)[index] for name in self.__slots__})
 
 
-def ground(loops: Loops, q: Array) -> Ground:
-    """Return where walkers at q (n, nq) stand."""
-    n, nv, na = q.shape[0], loops.tree.nv, loops.actuated.size
-    poses = loops.tree.poses(q)
-    if not loops.m:
-        T, one, no = np.broadcast_to(np.eye(nv), (n, nv, nv)), np.ones(n), np.zeros((n, 0))
-        return Ground(q, np.zeros(n), no, T, np.zeros((n, nv, 0)), one, np.zeros(n), one, np.ones((n, 0)))
-    pairs = loops.pairs(poses)
-    residual = loops.residual(pairs)
-    blocks = loops.blocks(poses, pairs)
-    J = np.matmul(loops.reduce, loops.jacobian(poses, pairs)) * loops.column_scale
-    passive = loops.passive_map(blocks)
-    T, back, sigma, tied = _factored(J, nv - na)
-    size = np.abs(residual * loops.row_scale).max(axis=1)
-    return Ground(q, size, residual @ loops.reduce.T, T, back, sigma, tied, passive.sigma, passive.sign)
-
-
-def _factored(J: Array, rank: int) -> tuple[Array, Array, Array, Array]:
-    """Return tangent, pseudo-inverse, smallest singular value and rate left for Jacobians (n, r, nv) of a rank."""
-    if J.shape[1] == rank:
-        Q, R = np.linalg.qr(np.swapaxes(J, 1, 2), mode="complete")
-        X, _ = inverse(np.swapaxes(R[:, :rank], 1, 2))
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            sigma = 1.0 / np.sqrt(np.einsum("nij,nij->n", X, X))
-            back = np.matmul(Q[:, :, :rank], X)
-        return Q[:, :, rank:], back, np.where(np.isfinite(sigma), sigma, 0.0), np.zeros(J.shape[0])
-    U, s, Vt = np.linalg.svd(J)  # rows that depend on each other wherever the loops are closed
-    V = np.swapaxes(Vt, 1, 2)
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        back = np.matmul(V[:, :, :rank] / s[:, None, :rank], np.swapaxes(U[:, :, :rank], 1, 2))
-    return V[:, :, rank:], back, s[:, rank - 1] if rank else np.ones(J.shape[0]), s[:, rank]
+def ground(here: Configurations) -> Ground:
+    """Return where walkers stand."""
+    J, passive = here.factored, here.passive
+    sound = (here.error <= _CLOSED) & (J.sigma > BRANCHING) & (J.tied < TIED)
+    return Ground(here.q, J.tangent, J.sigma, sound, passive.sigma, passive.sign)
 
 
 def close(loops: Loops, q: Array, longest: Array) -> tuple[Ground, Array]:
     """Bring nearly closed configurations (n, nq) to the closures; what is left shows in the residual.
 
     Args:
+        loops: the closures.
+        q: configurations (n, nq).
         longest: how far the coordinates may move before a walker is given up (n,) [rad, or chain lengths].
 
     Returns:
         Where they stand, and how far they moved (n,).
     """
-    here = ground(loops, q)
-    moved = np.zeros(q.shape[0])
-    last = np.zeros(q.shape[0], dtype=np.bool_)
-    for _ in range(_NEWTON if loops.m else 0):
-        step = -np.matmul(here.back, here.reduced[..., None])[..., 0]
-        step[last | ~np.isfinite(step).all(axis=1) | (moved > longest)] = 0.0
-        if not step.any():
-            break
-        last = here.residual < _NEARLY
-        moved += np.abs(step).max(axis=1)
-        here = ground(loops, loops.tree.integrate(here.q, step * loops.column_scale))
-    return here, moved
+    rule = _BackSteps(longest)
+    iterate(loops, q, rule, most=_NEWTON + 1)  # the last one only looks
+    return ground(rule.reached), rule.moved
+
+
+class _BackSteps:
+    """Newton steps of least length in all coordinates. Walkers that are done wait for the others."""
+
+    reached: Configurations
+
+    def __init__(self, longest: Array) -> None:
+        self.moved = np.zeros(longest.size)
+        self._longest, self._last, self._left = longest, np.zeros(longest.size, dtype=np.bool_), _NEWTON
+
+    def __call__(self, here: Configurations, which: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.bool_]]:
+        self.reached = here
+        step = -np.matmul(here.factored.back, here.reduced[..., None])[..., 0]
+        step[self._last | ~np.isfinite(step).all(axis=1) | (self.moved > self._longest)] = 0.0
+        if not self._left or not step.any():
+            return here.q, np.zeros(which.size, dtype=np.bool_)
+        self._left -= 1
+        self._last = here.error < _NEARLY
+        self.moved += np.abs(step).max(axis=1)
+        return here.loops.tree.integrate(here.q, step * here.loops.column_scale), np.ones(which.size, dtype=np.bool_)
 
 
 class Walk:
@@ -160,7 +137,7 @@ class Walk:
         step = along * (length / np.maximum(np.abs(along).max(axis=1, initial=0.0), 1e-12))[:, None]
         longest = _DETOUR * np.maximum(length, _FREE)
         there, detour = close(loops, loops.tree.integrate(here.q, step * loops.column_scale), longest)
-        went = there.regular() & (detour <= longest) & self._limits.inside(loops, there.q)
+        went = there.sound & (detour <= longest) & self._limits.inside(loops, there.q)
         if self._careful:
             went &= (there.sign == here.sign).all(axis=1) & (there.control > HELD)
         self.here = here.replaced(went, there)

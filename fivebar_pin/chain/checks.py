@@ -29,7 +29,7 @@ def check_tree(model: pin.Model) -> None:
             "mimic joints",
             mimics,
             "cannot be part of a chain: the bodies they move would be left out",
-            "Build the model without mimic: buildModelFromUrdf reads them as joints of their own.",
+            "Build the model without mimic: buildModelFromUrdf makes them joints of their own; a Coupling ties them.",
         )
     _check_losses(model)
 
@@ -78,16 +78,7 @@ def _owner(model: pin.Model, k: int, starts: str) -> str:
 def check_closures(model: pin.Model, closures: tuple[Closure, ...]) -> None:
     frames = frames_by_name(model) if closures else {}
     for closure in closures:
-        for frame in closure.frames:
-            if frame not in frames:
-                raise UnknownNameError(f"frame of closure {closure.name}", frame, frames)
-        first, second = (frames[f].parentJoint for f in closure.frames)
-        if first == second:
-            raise InvalidInputError(
-                f"closure {closure.name}",
-                closure.frames,
-                f"joins two frames of one body ({model.names[first]})",
-            )
+        closure.check(model, frames)
     names = [c.name for c in closures]
     if len(set(names)) != len(names):
         raise InvalidInputError("closure names", names, "must differ")

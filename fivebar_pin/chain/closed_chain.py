@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,28 +12,37 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
+from fivebar_pin.chain.counting import counting_turns
 from fivebar_pin.chain.frames import frames_by_name
+from fivebar_pin.chain.parameters import Geometry
+from fivebar_pin.chain.reshape import put_in_place, reshaped
+from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.chain.visual import Visual
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
+from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["ClosedChain"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedChain(Immutable):
-    """An open tree, the closures that make loops of it, and the joints that are driven.
+    """An open tree, the closures that make loops of it, the joints that are driven, and the springs.
 
     Args:
-        model: the open tree; copied, the caller's stays untouched.
+        model: the open tree; copied, the caller's stays untouched. A joint that a coupling ties counts its turns: one
+            whose coordinates are a cosine and a sine is stored as an ordinary revolute joint about the same axis,
+            without limits, so that q has one coordinate for it instead of two (`chain.nq`, not `model.nq`, counts).
         closures: loop closures between frames of the tree.
         actuated: names of the driven joints, in the order of all actuated columns; one degree of freedom each.
         name: what reports call the mechanism; the model's name unless given.
         visuals: shapes to draw.
+        springs: springs and dampers between frames and on joints; all dynamics and balancing take them from here.
+        geometry: named lengths and placements, and how joints, frames and bodies follow them; none unless given.
 
     Raises:
-        InvalidInputError: a closure within one body, a joint named twice or with several degrees of freedom,
-            placements or inertias that are not finite.
+        InvalidInputError: a closure within one body, a joint named twice or with several degrees of freedom, a spring
+            within one body, placements or inertias that are not finite.
         UnknownNameError: a frame or joint that the model does not have.
     """
 
@@ -42,6 +51,8 @@ class ClosedChain(Immutable):
     actuated: tuple[str, ...]
     name: str = ""
     visuals: tuple[Visual, ...] = ()
+    springs: tuple[Spring | JointSpring, ...] = ()
+    geometry: Geometry = field(default_factory=Geometry)
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, pin.Model):
@@ -50,19 +61,26 @@ class ClosedChain(Immutable):
         for name, kind in (("closures", Closure), ("actuated", str), ("visuals", Visual)):
             object.__setattr__(self, name, all_of(name, getattr(self, name), kind))
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
+        if not isinstance(self.geometry, Geometry):
+            raise InvalidInputError("geometry", self.geometry, "must be a Geometry")
+        put_in_place(self.model, self.geometry)
         check_tree(self.model)
         check_closures(self.model, self.closures)
+        counted = {name for closure in self.closures for name in closure.counted}
+        object.__setattr__(self, "model", counting_turns(self.model, counted))
         check_actuated(self.model, self.actuated)
+        object.__setattr__(self, "springs", checked_springs(self.model, self.springs))
         frames = {f.name for f in self.model.frames} if self.visuals else set()
         for visual in self.visuals:
             if visual.frame not in frames:
                 raise UnknownNameError("frame", visual.frame, sorted(frames))
 
     def __repr__(self) -> str:
-        closures = ", ".join(f"{c.name} ({c.kind.value})" for c in self.closures) or "none"
+        closures = ", ".join(f"{c.name} ({c.kind})" for c in self.closures) or "none"
+        springs = f"; springs: {', '.join(s.name for s in self.springs)}" if self.springs else ""
         return (
             f"ClosedChain({self.name!r}: {self.model.njoints - 1} joints, nq = {self.nq}, nv = {self.nv}; "
-            f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'})"
+            f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'}{springs})"
         )
 
     @property
@@ -115,6 +133,11 @@ class ClosedChain(Immutable):
         """Named configurations that came with the model (nq,)."""
         return {entry.key(): frozen(entry.data()) for entry in self.model.referenceConfigurations}
 
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Named lengths and placements and their values, read-only [m or rad]; `with_parameters` changes them."""
+        return self.geometry.parameters
+
     @cached_property
     def length(self) -> float:
         """Characteristic length [m]: the mean distance between neighbouring joints, closures included.
@@ -125,11 +148,23 @@ class ClosedChain(Immutable):
         spans, origin = [], np.array(model.jointPlacements[1].translation) if model.njoints > 1 else np.zeros(3)
         places = [(model.parents[j], model.jointPlacements[j].translation) for j in range(1, model.njoints)]
         frames = frames_by_name(model) if self.closures else {}
-        ends = [frames[f] for closure in self.closures for f in closure.frames]
+        ends = [frames[f] for closure in self.closures for f in closure.ends]
         for parent, place in [*places, *((f.parentJoint, f.placement.translation) for f in ends)]:
             spans.append(float(np.linalg.norm(place - origin if parent == 0 else place)))
         real = [s for s in spans if s > 0.0]
         return float(np.mean(real)) if real else 1.0
+
+    def columns(self, joint: str) -> tuple[slice, slice]:
+        """Return where a joint's coordinates are in a configuration q and in v, a.
+
+        Raises:
+            UnknownNameError: there is no such joint.
+        """
+        if joint not in self.joints:
+            raise UnknownNameError("joint", joint, self.joints)
+        j = self.model.getJointId(joint)
+        q, v, own = int(self.model.idx_qs[j]), int(self.model.idx_vs[j]), self.model.joints[j]
+        return slice(q, q + int(own.nq)), slice(v, v + int(own.nv))
 
     def with_inertias(self, inertias: Mapping[str, pin.Inertia]) -> ClosedChain:
         """Return the same mechanism with other inertias for the named joints' bodies."""
@@ -145,6 +180,25 @@ class ClosedChain(Immutable):
         pi = checked("inertial parameters", parameters, (self.model.njoints - 1, 10))
         return self.with_inertias({j: _inertia(j, row) for j, row in zip(self.joints, pi, strict=True)})
 
+    def with_parameters(self, values: Mapping[str, float] | None = None, /, **named: float) -> ClosedChain:
+        """Return the same mechanism with other values of its named lengths and placements.
+
+        Joints and frames go where the new values put them; bodies follow by their rules, and so do their boxes among
+        the visuals; what a link carries beyond its rules stays where it is on the link. Named configurations
+        (`references`) are kept as they are: they no longer close the loops, and are starts for `assemble`.
+
+        Args:
+            values: by name [m or rad]; for names that are no words of Python.
+            named: the same as keywords.
+
+        Raises:
+            UnknownNameError: no such parameter; lists those there are.
+            InvalidInputError: not a finite number, a length that is not positive, or a body cut down to nothing.
+        """
+        geometry = self.geometry.with_values({**(values or {}), **named})
+        model, visuals = reshaped(self.model, self.visuals, geometry)
+        return replace(self, model=model, visuals=visuals, geometry=geometry)
+
     def with_gravity(self, gravity: npt.ArrayLike) -> ClosedChain:
         """Return the same mechanism under another gravity (3,) [m/s2]."""
         model = self.model.copy()
@@ -154,6 +208,10 @@ class ClosedChain(Immutable):
     def with_actuated(self, actuated: Iterable[str]) -> ClosedChain:
         """Return the same mechanism driven at other joints."""
         return replace(self, actuated=all_of("actuated", actuated, str))
+
+    def with_springs(self, springs: Iterable[Spring | JointSpring]) -> ClosedChain:
+        """Return the same mechanism with these springs in place of its own."""
+        return replace(self, springs=checked_springs(self.model, springs))
 
 
 def _inertia(joint: str, pi: Array) -> pin.Inertia:

@@ -20,7 +20,7 @@ def add_gravity(parser: argparse.ArgumentParser) -> None:
 
 
 def load_any(path: str, gravity: Sequence[float] | None = None) -> ClosedChain:
-    """Load a file, a folder or a mechanism that ships."""
-    from fivebar_pin import io
+    """Load a file, a linkage among them, a folder or a mechanism that ships."""
+    from fivebar_pin.planar.loading import load
 
-    return io.load(path, gravity=gravity)
+    return load(path, gravity=gravity)

@@ -20,6 +20,7 @@ from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 
+_SHOWN = 1e-7  # mass of material that is worth a row [of the moving mass]
 _MOST_POINTS = 10_000  # designs on a front; each is a problem to solve
 
 
@@ -84,11 +85,11 @@ def run_conditions(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import balance_conditions
 
     chain = load_any(chosen.path, chosen.gravity)
-    conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen))
+    conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen, chain))
     console = _tables.console()
     console.print(str(conditions), markup=False, soft_wrap=True)
     residual = float(np.abs(conditions.residual(chain)).max(initial=0.0))
-    sizes = np.abs(conditions.matrix) @ np.abs(chain.inertial_parameters.reshape(-1))
+    sizes = np.abs(conditions.matrix) @ np.abs(chain.inertial_parameters.reshape(-1)) + np.abs(conditions.offset)
     words = figures(residual, float(sizes.max(initial=0.0)))
     console.print(f"largest residual of {chain.name} as it is: {words} kg", markup=False)
     return 0
@@ -105,7 +106,7 @@ def run_balance(chosen: argparse.Namespace) -> int:
     limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
     console = _tables.console()
     with _tables.progress().status("balancing"):
-        options = _options(chosen, trajectory)
+        options = _options(chosen, chain, trajectory)
         piece = _piece(chosen, chain)
         design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, counterweight=piece, **options)
     if not design.feasible:
@@ -135,7 +136,7 @@ def run_pareto(chosen: argparse.Namespace) -> int:
     integer("--points", chosen.points, least=2, most=_MOST_POINTS)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
     chain = load_any(chosen.path, chosen.gravity)
-    options = _options(chosen, moved(chain, chosen.motion))
+    options = _options(chosen, chain, moved(chain, chosen.motion))
     console = _tables.console()
     with _tables.progress().status("tracing the front"):
         front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)
@@ -150,7 +151,7 @@ def run_pareto(chosen: argparse.Namespace) -> int:
 
 
 def _common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
     parser.add_argument(
         "--kind", choices=_KINDS, metavar="KIND", default="force", help="what is to vanish: %(choices)s [force]"
     )
@@ -190,15 +191,18 @@ def _designing(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _direction(chosen: argparse.Namespace) -> Any:
+def _direction(chosen: argparse.Namespace, chain: ClosedChain) -> Any:
+    """Return the gravity of static balance: springs are held by the weight that there is, others by any."""
     if chosen.along is None:
-        return "any"
+        return "model" if chosen.kind == "static" and chain.springs else "any"
     if chosen.kind != "static":
         raise InvalidInputError("--along", chosen.along, "has a meaning for --kind static only")
+    if chain.springs:
+        raise InvalidInputError("--along", chosen.along, "has no size to hold springs by", "Pass --gravity X Y Z.")
     return chosen.along
 
 
-def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, Any]:
+def _options(chosen: argparse.Namespace, chain: ClosedChain, trajectory: Trajectory) -> dict[str, Any]:
     from fivebar_pin.balancing import Ball
 
     return {
@@ -210,7 +214,7 @@ def _options(chosen: argparse.Namespace, trajectory: Trajectory) -> dict[str, An
         "masses": None if chosen.masses is None else tuple(chosen.masses),
         "remove": chosen.remove,
         "motions": [trajectory],
-        "gravity": _direction(chosen),
+        "gravity": _direction(chosen, chain),
         "near": trajectory.q[0] if chosen.branch == "motion" else None,
         **({} if chosen.solver is None else {"solver": chosen.solver}),
     }
@@ -295,7 +299,7 @@ def _print_design(console: Any, design: Any, after: ClosedChain, pair: list[Any]
     rows = [
         [word, c.body, f"{c.mass:.6g}", _place(design, c), _inertia(design, c)]
         for word, c in changes
-        if c.mass > 1e-7 * design.original.mass
+        if c.mass > _SHOWN * design.original.mass
     ]
     title = f"{design.original.name}: {_balance(design)}, {design.status}; moving mass {_gained(design)} kg"
     headings = ("", "body of joint", "mass [kg]", "at [m], joint axes", "inertia about it [kg m2]")

@@ -13,7 +13,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         help="check a mechanism's loops, mobility, actuation and inertias",
         description="Print a diagnosis; exit code 1 when something is wrong with the mechanism.",
     )
-    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
     parser.set_defaults(run=run)
 
 

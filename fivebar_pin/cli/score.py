@@ -35,7 +35,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         help="score many mass distributions of a mechanism",
         description="Score mass distributions, from a file or drawn at random about the mechanism's own.",
     )
-    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
     given = parser.add_mutually_exclusive_group(required=True)
     given.add_argument(
         "--designs",

@@ -22,7 +22,7 @@ _LONGEST = 1e9  # time to simulate [s]; a progress bar cannot even show more
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser("simulate", help="integrate the motion of a mechanism under gravity and given torques")
-    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
     parser.add_argument("--time", type=float, default=2.0, help="time to simulate [2 s]")
     parser.add_argument("--samples", type=int, default=201, help="output samples [201]")
     parser.add_argument("--torque", type=float, nargs="+", help="constant torque of each actuated joint [0]")
@@ -85,6 +85,9 @@ def _torque(chain: ClosedChain, given: list[float] | None) -> list[float] | None
 
 def _why(chain: ClosedChain, torque: list[float] | None) -> str:
     """Say what a mechanism that stays at rest lacks."""
+    if chain.springs:
+        names = ", ".join(spring.name for spring in chain.springs)
+        return f"weight, torque, friction and springs ({names}) hold each other. Pass --torque, or another --gravity."
     if not np.any(chain.model.gravity.linear) and not np.any(torque or 0.0):
         return "it starts at rest, and there is no gravity and no torque. Pass --gravity X Y Z or --torque."
     if np.any(chain.model.upperDryFrictionLimit):

@@ -16,7 +16,7 @@ from fivebar_pin.dynamics import inverse_dynamics
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser("view", help="show a mechanism in the browser, or write it as one HTML file")
-    parser.add_argument("path", help="URDF with sidecar, MJCF, folder, or the name of a shipped mechanism")
+    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
     parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints (t, q_*, v_*, a_*)")
     parser.add_argument("--html", metavar="FILE", help="write this HTML file instead of opening the browser")
     parser.add_argument("--speed", type=float, default=1.0, help="playing speed over real time [1]")

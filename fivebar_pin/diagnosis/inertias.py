@@ -8,14 +8,16 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.mass import composite_mass_matrix
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
-from fivebar_pin.mechanism.mobility import Site
+from fivebar_pin.mechanism.plane import plane_normal
 
-__all__ = ["inertia_problems", "mass_problem", "plane_normal"]
+__all__ = ["inertia_problems", "mass_problem", "normals"]
 
 
 _ROUND_OFF = 1e-9  # of the largest entry [-]
 _SINGULAR_MASS = 1e-12  # smallest to largest eigenvalue of the reduced mass matrix [-]
+_MOVES = 1e-6  # share of a joint in the motion without inertia from which on it is named [-]
 _FAR = 20.0  # chain lengths beyond which a mass centre counts as misplaced
 
 
@@ -62,25 +64,24 @@ def _one_body(inertia: pin.Inertia) -> str:
     if moments[2] > (moments[0] + moments[1]) * (1.0 + _ROUND_OFF):
         listed = ", ".join(f"{x:.4g}" for x in moments)
         return f"its principal moments {listed} kg m2 break the triangle inequality"
-    spread = 0.5 * np.trace(I) * np.eye(3) - I
-    if np.linalg.eigvalsh(spread)[0] < -_ROUND_OFF * np.abs(spread).max():
-        return "its pseudo-inertia is not positive semidefinite"
     return ""
 
 
-def mass_problem(chain: ClosedChain, site: Site) -> str:
+def mass_problem(chain: ClosedChain, site: Configurations) -> str:
     """Say which joints move without inertia at a site, or nothing."""
     model = chain.model
-    if not site.free.shape[1]:
+    if not site.free.shape[2]:
         return ""
     loops = loops_of(chain)
-    M = composite_mass_matrix(loops.tree, model, site.q)
-    free = loops.column_scale[:, None] * site.free
+    M = composite_mass_matrix(loops.tree, model, site.q[0])
+    free = loops.column_scale[:, None] * site.free[0]
     values, vectors = np.linalg.eigh(free.T @ M @ free)
     if values[0] > _SINGULAR_MASS * max(float(np.abs(values).max()), 0.0):
         return ""
-    moving = np.abs(site.free @ vectors[:, 0])
-    names = [chain.joints[j - 1] for j in range(1, model.njoints) if moving[_columns(model, j)].max(initial=0.0) > 1e-6]
+    moving = np.abs(site.free[0] @ vectors[:, 0])
+    names = [
+        chain.joints[j - 1] for j in range(1, model.njoints) if moving[_columns(model, j)].max(initial=0.0) > _MOVES
+    ]
     how = "negative" if values[0] < -_SINGULAR_MASS * float(np.abs(values).max()) else "no"
     return (
         f"the mechanism can move with {how} kinetic energy (joints {', '.join(names)}): accelerations do not follow "
@@ -88,23 +89,10 @@ def mass_problem(chain: ClosedChain, site: Site) -> str:
     )
 
 
-def plane_normal(chain: ClosedChain, site: Site) -> Array | None:
-    """Return the normal of the plane of motion in every joint's own axes (njoints - 1, 3), or None.
-
-    The motion counts as planar when no joint turns about, or slides along, anything else.
-    """
-    tree = loops_of(chain).tree
-    poses = tree.poses(site.q[None])
-    S = poses.S[0]
-    turning = S[3:, np.linalg.norm(S[3:], axis=0) > 1e-12]
-    if not turning.shape[1]:
-        return None
-    n = turning[:, 0] / np.linalg.norm(turning[:, 0])
-    across = np.abs(np.cross(turning.T, n)).max(initial=0.0)
-    slides = S[:3, np.linalg.norm(S[3:], axis=0) <= 1e-12]
-    if across > 1e-9 or np.abs(n @ slides).max(initial=0.0) > 1e-9:
-        return None
-    return np.stack([R[0].T @ n for R in poses.R[1:]])
+def normals(chain: ClosedChain, site: Configurations) -> Array | None:
+    """Return the normal of the plane of motion in every joint's own axes (njoints - 1, 3), None when not planar."""
+    n = plane_normal(site.poses.S, chain.length)
+    return None if n is None else np.stack([R[0].T @ n for R in site.poses.R[1:]])
 
 
 def _columns(model: pin.Model, j: int) -> slice:

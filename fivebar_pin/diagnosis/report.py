@@ -113,8 +113,11 @@ class Diagnosis(Immutable):
             where the actuated joints do not determine the motion [-].
         amplification: largest passive speed per unit actuated speed here, scaled [-]; infinite at the singularity.
         determinate_joints: which components of every joint's reaction are determinate (njoints - 1, 6).
-        determinate_closures: the same for the closures (closures, 6), axes of frame 1; force before moment.
+        determinate_closures: the same for the closures (closures, 6), axes of frame 1; force before moment. A coupling
+            of joints has no wrench and no component of one.
+        determinate_rows: of every closure the rows whose multipliers are determinate.
         joints, closures: names that the rows of these two belong to.
+        springs: names of the springs.
         problems: findings, the gravest first.
     """
 
@@ -137,8 +140,10 @@ class Diagnosis(Immutable):
     amplification: float
     determinate_joints: npt.NDArray[np.bool_]
     determinate_closures: npt.NDArray[np.bool_]
+    determinate_rows: tuple[tuple[str, ...], ...]
     joints: tuple[str, ...]
     closures: tuple[str, ...]
+    springs: tuple[str, ...]
     problems: tuple[Finding, ...]
 
     @property
@@ -154,6 +159,8 @@ class Diagnosis(Immutable):
     def determinate(self, name: str) -> str:
         """Return the determinate reaction components of a joint or closure as words, like 'fx fy mz'.
 
+        Of a closure that has no wrench (a coupling) they are its determinate rows.
+
         Raises:
             UnknownNameError: neither a joint nor a closure.
         """
@@ -161,7 +168,10 @@ class Diagnosis(Immutable):
         known.update(zip(self.joints, self.determinate_joints, strict=True))
         if name not in known:
             raise UnknownNameError("joint or closure", name, known)
-        return " ".join(c for c, yes in zip(_COMPONENTS, known[name], strict=True) if yes)
+        words = [c for c, yes in zip(_COMPONENTS, known[name], strict=True) if yes]
+        if not words and name in self.closures:
+            words = list(self.determinate_rows[self.closures.index(name)])
+        return " ".join(words)
 
     def __str__(self) -> str:
         return "\n".join(_lines(self))
@@ -178,6 +188,8 @@ def _lines(d: Diagnosis) -> Iterator[str]:
     for k, row in enumerate(d.redundant):
         yield _entry("" if k else "redundant", str(row))
     yield _entry("actuated", f"{', '.join(d.actuated) or 'none'}: {d.actuation.value}")
+    if d.springs:
+        yield _entry("springs", ", ".join(d.springs))
     if d.undetermined and d.actuated:
         yield _entry("left free", ", ".join(d.undetermined))
     if d.actuation in (Actuation.EXACT, Actuation.OVER):

@@ -5,6 +5,7 @@ from fivebar_pin.dynamics.forward import forward_dynamics
 from fivebar_pin.dynamics.inverse import inverse_dynamics
 from fivebar_pin.dynamics.loads import Loads
 from fivebar_pin.dynamics.reactions import Reactions
+from fivebar_pin.dynamics.reduced import reduced_dynamics
 
 __all__ = [
     "EnergyBalance",
@@ -13,4 +14,5 @@ __all__ = [
     "energy_balance",
     "forward_dynamics",
     "inverse_dynamics",
+    "reduced_dynamics",
 ]

@@ -21,6 +21,7 @@ __all__ = [
     "body_rates",
     "centres",
     "gravity_wrenches",
+    "rotor_energy",
     "sizes",
     "speeds",
     "total_centre",
@@ -61,6 +62,16 @@ class BodyRates(Immutable):
     twist: Array
     momentum: Array
     rate: Array
+
+    @property
+    def kinetic_energy(self) -> Array:
+        """Kinetic energy of all bodies together (n,) [J]; rotors have their own, see `rotor_energy`."""
+        return np.asarray(0.5 * np.sum(self.twist * self.momentum, axis=(1, 2)))
+
+
+def rotor_energy(chain: ClosedChain, v: Array) -> Array:
+    """Return the kinetic energy of the rotors where joints have an armature, at velocities v (n, nv) -> (n,) [J]."""
+    return np.asarray(0.5 * np.sum(np.array(chain.model.armature) * v**2, axis=1))
 
 
 def centres(bodies: Bodies, poses: Poses) -> Array:

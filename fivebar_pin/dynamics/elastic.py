@@ -6,19 +6,20 @@ on a joint        tau = -k (q - rest) - b dq/dt
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, cross
 from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
+from fivebar_pin.errors import SolverError
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["SpringForces", "body_wrenches", "checked_springs", "frame_points", "spring_forces", "wrench_force"]
+__all__ = ["SpringForces", "body_wrenches", "frame_points", "resting_force", "spring_forces"]
+
+_TOGETHER = 1e-12  # distance of a spring's ends that is round-off: they lie on one point [chain lengths]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,62 +30,54 @@ class SpringForces(Immutable):
         force: generalised force on the tree (n, nv) [N m or N].
         energy: stored (n,) [J].
         dissipation: power the dampers take (n,) [W].
+        size: sum of the sizes of all springs' forces on the tree (n, nv) [N m or N].
     """
 
     force: Array
     energy: Array
     dissipation: Array
+    size: Array
+
+    def __add__(self, other: SpringForces) -> SpringForces:
+        return SpringForces(
+            self.force + other.force,
+            self.energy + other.energy,
+            self.dissipation + other.dissipation,
+            self.size + other.size,
+        )
 
 
-def checked_springs(chain: ClosedChain, springs: Iterable[Spring | JointSpring]) -> tuple[Spring | JointSpring, ...]:
-    """Return the springs as a tuple once every frame and joint is known to the chain."""
-    frames = [f.name for f in chain.model.frames]
-    springs = tuple(springs)
+def spring_forces(chain: ClosedChain, loops: Loops, q: Array, v: Array, poses: Poses) -> SpringForces:
+    """Evaluate all springs of the chain at states q (n, nq), v (n, nv)."""
+    return _sum(chain, chain.springs, loops, q, v, poses)
+
+
+def resting_force(chain: ClosedChain, loops: Loops, q: Array, poses: Poses) -> Array:
+    """Return the generalised force (n, nv) of the chain's springs at rest in q (n, nq), where dampers play no part."""
+    undamped = tuple(replace(spring, damping=0.0) for spring in chain.springs)
+    return _sum(chain, undamped, loops, q, np.zeros((q.shape[0], chain.nv)), poses).force
+
+
+def _sum(
+    chain: ClosedChain, springs: tuple[Spring | JointSpring, ...], loops: Loops, q: Array, v: Array, poses: Poses
+) -> SpringForces:
+    none = np.zeros(v.shape[0])
+    total = SpringForces(np.zeros_like(v), none, none, np.zeros_like(v))
     for spring in springs:
         if isinstance(spring, JointSpring):
-            if spring.joint not in chain.joints:
-                raise UnknownNameError("joint of a spring", spring.joint, chain.joints)
-            nv = chain.model.joints[chain.model.getJointId(spring.joint)].nv
-            if nv != 1:
-                raise InvalidInputError(f"spring on joint {spring.joint}", f"nv = {nv}", "needs one degree of freedom")
-        elif isinstance(spring, Spring):
-            for frame in (spring.frame1, spring.frame2):
-                if frame not in frames:
-                    raise UnknownNameError("frame of a spring", frame, frames)
+            total = total + _on_joint(chain, loops, spring, q, v)
         else:
-            raise InvalidInputError("springs", spring, "must hold Spring and JointSpring objects")
-    return springs
-
-
-def spring_forces(
-    chain: ClosedChain,
-    loops: Loops,
-    springs: Iterable[Spring | JointSpring],
-    q: Array,
-    v: Array,
-    poses: Poses,
-) -> SpringForces:
-    """Evaluate all springs at states q (n, nq), v (n, nv)."""
-    total = SpringForces(np.zeros_like(v), np.zeros(v.shape[0]), np.zeros(v.shape[0]))
-    for spring in springs:
-        one = (
-            _on_joint(chain, loops, spring, q, v)
-            if isinstance(spring, JointSpring)
-            else _between(chain, loops, spring, v, poses)
-        )
-        total = SpringForces(total.force + one.force, total.energy + one.energy, total.dissipation + one.dissipation)
+            total = total + _between(chain, loops, spring, v, poses)
     return total
 
 
-def body_wrenches(
-    chain: ClosedChain, loops: Loops, springs: Iterable[Spring | JointSpring], v: Array, poses: Poses
-) -> Array:
-    """Return the wrench of the springs between frames on every body, at the world origin (n, nb, 6).
+def body_wrenches(chain: ClosedChain, loops: Loops, v: Array, poses: Poses) -> Array:
+    """Return the wrench of the chain's springs between frames on every body, at the world origin (n, nb, 6).
 
     Springs on joints act through the joint and are not among them.
     """
     out = np.zeros((v.shape[0], chain.model.njoints - 1, 6))
-    for spring in springs:
+    for spring in chain.springs:
         if isinstance(spring, JointSpring):
             continue
         pull = _pull(chain, loops, spring, v, poses)
@@ -104,12 +97,6 @@ def frame_points(chain: ClosedChain, loops: Loops, frame: str, poses: Poses) -> 
     return point, poses.S * loops.tree.support[j]
 
 
-def wrench_force(point: Array, J: Array, wrench: Array) -> Array:
-    """Return the generalised force (n, nv) of a wrench (n, 6) at a point (n, 3); J as from `frame_points`."""
-    moment = wrench[:, 3:] + cross(point, wrench[:, :3])
-    return np.asarray(np.einsum("nik,ni->nk", J[:, :3], wrench[:, :3]) + np.einsum("nik,ni->nk", J[:, 3:], moment))
-
-
 def _on_joint(chain: ClosedChain, loops: Loops, spring: JointSpring, q: Array, v: Array) -> SpringForces:
     joint = chain.model.joints[chain.model.getJointId(spring.joint)]
     k = int(joint.idx_v)
@@ -118,7 +105,8 @@ def _on_joint(chain: ClosedChain, loops: Loops, spring: JointSpring, q: Array, v
         deflection = np.remainder(deflection + np.pi, 2.0 * np.pi) - np.pi
     force = np.zeros_like(v)
     force[:, k] = -spring.stiffness * deflection - spring.damping * v[:, k]
-    return SpringForces(force, 0.5 * spring.stiffness * deflection**2, spring.damping * v[:, k] ** 2)
+    energy, dissipation = 0.5 * spring.stiffness * deflection**2, spring.damping * v[:, k] ** 2
+    return SpringForces(force, energy, dissipation, np.abs(force))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,12 +127,12 @@ def _pull(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Pos
     size = np.linalg.norm(d, axis=1)
     stretch = size - spring.length
     free = spring.length == 0.0 and spring.damping == 0.0  # then the force is k d, without a direction to define
-    if not free and np.any(size < 1e-12 * chain.length):
+    if not free and np.any(size < _TOGETHER * chain.length):
         raise SolverError(
-            f"spring {spring.frame1}~{spring.frame2} has its ends on one point: the direction of its force is not "
+            f"spring {spring.name} has its ends on one point: the direction of its force is not "
             "defined there. Give it other frames, or a free length of zero and no damping."
         )
-    u = d / np.maximum(size, 1e-300)[:, None]
+    u = np.divide(d, size[:, None], out=np.zeros_like(d), where=size[:, None] > 0.0)
     # rate of |d|, as a row over v: u . (v_2 - v_1)
     row = np.einsum("ni,nik->nk", u, _point(p2, J2) - _point(p1, J1))
     rate = np.einsum("nk,nk->n", row, v)
@@ -154,7 +142,8 @@ def _pull(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Pos
 def _between(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Poses) -> SpringForces:
     pull = _pull(chain, loops, spring, v, poses)
     energy, dissipation = 0.5 * spring.stiffness * pull.stretch**2, spring.damping * pull.rate**2
-    return SpringForces(-pull.size[:, None] * pull.row, energy, dissipation)
+    force = -pull.size[:, None] * pull.row
+    return SpringForces(force, energy, dissipation, np.abs(force))
 
 
 def _point(p: Array, J: Array) -> Array:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, numeric
+from fivebar_pin._arrays import TINY, Array, Immutable, checked, finite, frozen, numeric
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.bodies import Bodies, body_rates, gravity_wrenches
-from fivebar_pin.dynamics.equations import System, checked_wrench
-from fivebar_pin.springs import JointSpring, Spring
+from fivebar_pin.dynamics.bodies import Bodies, body_rates, gravity_wrenches, rotor_energy
+from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["EnergyBalance", "energy_balance"]
@@ -58,12 +58,12 @@ class EnergyBalance(Immutable):
         """
         stored = self.potential + self.elastic
         scale = float((self.kinetic + self.rotor).max() + np.ptp(stored))
-        return float(np.abs(self.total - self.total[0]).max()) / max(scale, 1e-300)
+        return float(np.abs(self.total - self.total[0]).max()) / max(scale, TINY)
 
     def residual(self) -> float:
         """Return the largest mismatch of the rates: kinetic + rotor + stored = supplied - dissipated, relative [-]."""
         mismatch = np.abs(self.kinetic_rate + self.rotor_rate + self.stored_rate - self.supplied + self.dissipated)
-        return float(mismatch.max() / max(float(self.exchanged.max()), 1e-300))
+        return float(mismatch.max() / max(float(self.exchanged.max()), TINY))
 
 
 @finite()
@@ -72,7 +72,6 @@ def energy_balance(
     trajectory: Trajectory,
     *,
     torque: npt.ArrayLike | None = None,
-    springs: Iterable[Spring | JointSpring] = (),
     external: Mapping[str, npt.ArrayLike] | None = None,
 ) -> EnergyBalance:
     """Account for the energy along a trajectory, body by body.
@@ -81,13 +80,12 @@ def energy_balance(
         chain: the mechanism.
         trajectory: of this chain.
         torque: of the actuated joints (na,) or (n, na), as it was applied [N m or N]; None for none.
-        springs: as they were simulated.
         external: wrenches (6,) or (n, 6) by frame, as they were applied.
 
     Returns:
         Energies, their rate, and the powers supplied and dissipated.
     """
-    system, n, v = System.of(chain, tuple(springs)), len(trajectory), trajectory.v
+    system, n, v = EquationsOfMotion.of(chain), len(trajectory), trajectory.v
     given = np.zeros(chain.na) if torque is None else numeric("torque", torque)
     tau = checked(
         "torque", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na)
@@ -100,20 +98,19 @@ def energy_balance(
     weight = gravity_wrenches(bodies, moving.centre, gravity)
     armature = np.array(chain.model.armature)
     sprung = system.spring_forces(point, v)
-    applied = system.wrench_forces(point, checked_wrench(chain, external, n))
-    rotors = armature * v
+    applied = system.wrench_forces(point, checked_wrenches(chain, external, n))
     inertial = np.sum(moving.rate * moving.twist, axis=2)  # (n, nb)
     heavy = np.sum(weight * moving.twist, axis=2)
     driven = np.column_stack([tau * v[:, chain.actuated_index], applied * v])
     dissipated = np.sum(system.damping * v * v + system.friction * np.abs(v), axis=1) + sprung.dissipation
     gross = [inertial, heavy, driven, sprung.force * v, dissipated[:, None]]
     return EnergyBalance(
-        kinetic=frozen(0.5 * np.sum(moving.twist * moving.momentum, axis=(1, 2))),
-        rotor=frozen(0.5 * np.sum(rotors * v, axis=1)),
+        kinetic=frozen(moving.kinetic_energy),
+        rotor=frozen(rotor_energy(chain, v)),
         potential=frozen(-np.einsum("nbi,i,b->n", moving.centre, gravity, bodies.mass)),
         elastic=frozen(sprung.energy),
         kinetic_rate=frozen(inertial.sum(axis=1)),
-        rotor_rate=frozen(np.sum(rotors * trajectory.a, axis=1)),
+        rotor_rate=frozen(np.sum(armature * v * trajectory.a, axis=1)),
         stored_rate=frozen(-heavy.sum(axis=1) - np.sum(sprung.force * v, axis=1) - sprung.dissipation),
         supplied=frozen(driven.sum(axis=1)),
         dissipated=frozen(dissipated),

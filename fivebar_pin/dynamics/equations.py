@@ -10,7 +10,7 @@ The closure forces do no work on N and never appear.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,26 +18,25 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, checked, numeric
+from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
-from fivebar_pin.closures import ClosureKind
-from fivebar_pin.dynamics.elastic import SpringForces, checked_springs, frame_points, spring_forces, wrench_force
+from fivebar_pin.dynamics.elastic import SpringForces, spring_forces
 from fivebar_pin.dynamics.mass import depth_first, mass_matrix
-from fivebar_pin.errors import InvalidInputError, UnknownNameError
-from fivebar_pin.mechanism.manifold import Manifold, Point, manifold_of
-from fivebar_pin.springs import JointSpring, Spring
+from fivebar_pin.dynamics.wrenches import moved_to_origin
+from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.manifold import Manifold, manifold_of
 
-__all__ = ["Equations", "Mode", "System", "Wrench", "check_frame", "checked_wrench"]
+__all__ = ["STICKING", "EquationsOfMotion", "ReducedEquations", "Slip"]
 
-
-Wrench = npt.ArrayLike | Callable[[float, Array, Array], npt.ArrayLike]
 
 _FEW = 6  # up to here one Pinocchio call per sample beats the batch
+STICKING = 1e-10  # yield of joints that stick, as part of the largest, below which they hold each other [-]
 _MASSLESS = 1e-13  # smallest to largest eigenvalue of the reduced inertia below which it counts as singular [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mode:
+class Slip:
     """What dry friction does.
 
     Attributes:
@@ -50,7 +49,7 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equations:
+class ReducedEquations:
     """Reduced equations of motion, inertia w = force and a = N w + held, over a batch.
 
     Attributes:
@@ -67,37 +66,36 @@ class Equations:
 
 
 @dataclass(frozen=True, eq=False)
-class System:
-    """A chain with its springs, ready to give accelerations.
+class EquationsOfMotion:
+    """A chain, ready to give accelerations.
 
     Attributes:
         chain, manifold: the mechanism and its closed configurations.
-        springs: checked against the chain.
         damping, friction: viscous coefficients and dry friction torques of the joints (nv,).
         data: Pinocchio's workspace, this object's own.
     """
 
     chain: ClosedChain
     manifold: Manifold
-    springs: tuple[Spring | JointSpring, ...]
     damping: Array
     friction: Array
     data: pin.Data
 
     @staticmethod
-    def of(chain: ClosedChain, springs: tuple[Spring | JointSpring, ...]) -> System:
-        """Prepare a chain; checks the springs."""
+    def of(chain: ClosedChain) -> EquationsOfMotion:
+        """Prepare a chain."""
         model = chain.model
-        return System(
+        return EquationsOfMotion(
             chain,
             manifold_of(chain),
-            checked_springs(chain, springs),
             np.array(model.damping),
             np.array(model.upperDryFrictionLimit),
             model.createData(),
         )
 
-    def accelerations(self, point: Point, v: Array, applied: Array, rank: int, mode: Mode | None = None) -> Array:
+    def accelerations(
+        self, point: Configurations, v: Array, applied: Array, rank: int, slip: Slip | None = None
+    ) -> Array:
         """Return the joint accelerations (n, nv).
 
         Args:
@@ -105,58 +103,54 @@ class System:
             v: velocities that keep them closed (n, nv).
             applied: generalised forces of motors and from outside (n, nv) [N m or N].
             rank: of the closures.
-            mode: what dry friction does; the sign of v says it otherwise.
+            slip: what dry friction does; the sign of v says it otherwise.
         """
-        sense = np.sign(v) if mode is None else mode.sense
+        sense = np.sign(v) if slip is None else slip.sense
         eq = self.equations(point, v, applied - self.friction * sense, rank)
         free = _solve_inertia(eq.inertia, eq.force[..., None])
-        if mode is not None and mode.stuck.size:
-            E = eq.N[:, mode.stuck]
+        if slip is not None and slip.stuck.size:
+            E = eq.N[:, slip.stuck]
             yields = _solve_inertia(eq.inertia, np.swapaxes(E, 1, 2))
-            excess = np.matmul(E, free) + eq.held[:, mode.stuck, None]
-            free = free - np.matmul(yields, np.matmul(np.linalg.pinv(np.matmul(E, yields), rcond=1e-10), excess))
+            excess = np.matmul(E, free) + eq.held[:, slip.stuck, None]
+            free = free - np.matmul(yields, np.matmul(np.linalg.pinv(np.matmul(E, yields), rcond=STICKING), excess))
         return np.asarray(eq.held + np.matmul(eq.N, free)[..., 0])
 
-    def equations(self, point: Point, v: Array, applied: Array, rank: int) -> Equations:
+    def equations(self, point: Configurations, v: Array, applied: Array, rank: int) -> ReducedEquations:
         """Return the reduced equations of motion at states (n); dry friction must be among the applied forces."""
         loops, scale = self.manifold.loops, self.manifold.scale
         M, bias = self._mass_and_bias(point.q, v)
-        N = np.swapaxes(point.Vt[:, rank:], 1, 2) * scale[:, None]  # (n, nv, f)
+        N = point.independent.tangent(rank) * scale[:, None]  # (n, nv, f)
         force = applied - bias - self.damping * v
-        if self.springs:
+        if self.chain.springs:
             force = force + self.spring_forces(point, v).force
         held = np.zeros_like(v)
         if rank:
             drift = self._drift(point, v) @ loops.reduce.T
-            along = np.einsum("nir,ni->nr", point.U[:, :, :rank], drift) / point.s[:, :rank]
-            held = -np.einsum("nrk,nr->nk", point.Vt[:, :rank], along) * scale
+            held = -point.independent.solve(drift, rank) * scale
         force = force - np.matmul(M, held[..., None])[..., 0]
         NT = np.swapaxes(N, 1, 2)
-        return Equations(N, np.matmul(NT, np.matmul(M, N)), np.matmul(NT, force[..., None])[..., 0], held)
+        return ReducedEquations(N, np.matmul(NT, np.matmul(M, N)), np.matmul(NT, force[..., None])[..., 0], held)
 
-    def spring_forces(self, point: Point, v: Array) -> SpringForces:
+    def spring_forces(self, point: Configurations, v: Array) -> SpringForces:
         """Return what the springs do at states (n)."""
-        return spring_forces(self.chain, self.manifold.loops, self.springs, point.q, v, point.poses)
+        return spring_forces(self.chain, self.manifold.loops, point.q, v, point.poses)
 
-    def wrench_forces(self, point: Point, external: Mapping[str, Array]) -> Array:
+    def wrench_forces(self, point: Configurations, external: Mapping[str, Array]) -> Array:
         """Return the generalised forces (n, nv) of wrenches (n, 6) on frames."""
-        out = np.zeros((point.q.shape[0], self.chain.nv))
-        for frame, wrench in external.items():
-            origin, J = frame_points(self.chain, self.manifold.loops, frame, point.poses)
-            out += wrench_force(origin, J, wrench)
-        return out
+        acting = moved_to_origin(self.chain, point.poses, external)
+        return np.asarray(np.sum(acting.torques(self.manifold.loops.tree, point.poses), axis=0))
 
-    def project_velocity(self, point: Point, v: Array, rank: int) -> Array:
+    def project_velocity(self, point: Configurations, v: Array, rank: int) -> Array:
         """Return the velocity (nv,) that a sudden closing of the loops leaves of v: nearest in kinetic energy."""
         M, _ = self._mass_and_bias(point.q, v[None])
-        N = (point.Vt[:, rank:] * self.manifold.scale).swapaxes(1, 2)
+        N = point.independent.tangent(rank) * self.manifold.scale[:, None]
         NT = N.swapaxes(1, 2)
         return np.asarray((N @ _solve_inertia(NT @ M @ N, NT @ M @ v[None, :, None]))[0, :, 0])
 
-    def _drift(self, point: Point, v: Array) -> Array:
+    def _drift(self, point: Configurations, v: Array) -> Array:
         """Return the second rate of the closures at zero joint accelerations (n, m), the loops being closed."""
         loops, n = self.manifold.loops, v.shape[0]
-        if n > _FEW or any(c.kind is not ClosureKind.POINT for c in self.chain.closures):
+        if n > _FEW or not all(c.by_points for c in self.chain.closures):
             return loops.drift(point.pairs, loops.tree.rates(point.q, v, point.poses))
         model, data, out, still = self.chain.model, self.data, np.empty((n, loops.m)), np.zeros(self.chain.nv)
         for i in range(n):
@@ -174,7 +168,7 @@ class System:
         """Frame numbers of every closure."""
         model = self.chain.model
         named = frames_by_name(model)
-        found = [[named[name] for name in c.frames] for c in self.chain.closures]
+        found = [[named[name] for name in c.ends] for c in self.chain.closures]
         return [(model.getFrameId(f.name, f.type), model.getFrameId(g.name, g.type)) for f, g in found]
 
     def _mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -189,28 +183,6 @@ class System:
     @cached_property
     def _ordered(self) -> bool:
         return depth_first(self.chain.model)
-
-
-def checked_wrench(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] | None, n: int) -> dict[str, Array]:
-    """Return external wrenches (n, 6) by frame name.
-
-    Raises:
-        UnknownNameError: a frame that does not exist.
-        InvalidInputError: a wrong shape.
-    """
-    out = {}
-    for name, wrench in (external or {}).items():
-        check_frame(chain, name)
-        w = numeric(f"external[{name!r}]", wrench)
-        out[name] = checked(f"external[{name!r}]", np.broadcast_to(w, (n, 6)) if w.shape == (6,) else w, (n, 6))
-    return out
-
-
-def check_frame(chain: ClosedChain, name: str) -> None:
-    """Raise when an external force names a frame that the chain does not have."""
-    names = [f.name for f in chain.model.frames]
-    if name not in names:
-        raise UnknownNameError("frame of an external force", name, names)
 
 
 def _solve_inertia(inertia: Array, force: Array) -> Array:

@@ -5,19 +5,20 @@ Accelerations come from the null space of the closure Jacobian, so every mobilit
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, finite, numeric
+from fivebar_pin._arrays import TINY, Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import System, checked_wrench
+from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.errors import InvalidInputError
-from fivebar_pin.mechanism.manifold import Point
-from fivebar_pin.springs import JointSpring, Spring
+from fivebar_pin.mechanism.closing import closed_enough
+from fivebar_pin.mechanism.configurations import Configurations
 
-__all__ = ["constant_torque", "forward_dynamics", "require_consistent"]
+__all__ = ["constant_torque", "forward_dynamics", "require_closed", "require_consistent"]
 
 
 _CLOSED = 1e-8  # closure residual and velocity mismatch that a given state may have [-]
@@ -31,11 +32,10 @@ def forward_dynamics(
     tau: npt.ArrayLike | None = None,
     *,
     external: Mapping[str, npt.ArrayLike] | None = None,
-    springs: Iterable[Spring | JointSpring] = (),
 ) -> Array:
     """Compute the joint accelerations of the closed chain, a = N w + a_c with (N^T M N) w = N^T (...).
 
-    Gravity, armature, viscous damping and dry friction are taken from the chain's model; dry friction is -f sign(v),
+    Gravity, armature, viscous damping, dry friction and springs are taken from the chain; dry friction is -f sign(v),
     none at rest, as in `inverse_dynamics` (`simulate` lets joints stick). The mechanism may have any number of motors:
     the tangent space of the closures is used, not the actuated joints.
 
@@ -47,7 +47,6 @@ def forward_dynamics(
             unless given.
         external: forces from outside: frame name -> wrench (6,) or (n, 6), force [N] and moment [N m] in world axes at
             the frame's origin.
-        springs: springs and dampers.
 
     Returns:
         Accelerations (nv,) or (n, nv) [rad/s2 or m/s2].
@@ -55,8 +54,9 @@ def forward_dynamics(
     Raises:
         InvalidInputError: wrong shapes; q not closed or v not consistent with the closures; a motion without inertia.
         SingularityError: q is a bifurcation, where the motion is not determined.
+        SolverError: a spring whose ends meet has a force of no direction.
     """
-    system = System.of(chain, tuple(springs))
+    system = EquationsOfMotion.of(chain)
     Q = numeric("q", q)
     single = Q.ndim == 1
     Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
@@ -67,8 +67,8 @@ def forward_dynamics(
     given = constant_torque(chain, tau)
     T = checked("tau", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na))
     point = system.manifold.at(Q)
-    require_consistent(system, point, V)
-    applied = system.wrench_forces(point, checked_wrench(chain, external, n))
+    require_consistent(point, V)
+    applied = system.wrench_forces(point, checked_wrenches(chain, external, n))
     applied[:, chain.actuated_index] += T
     a = system.accelerations(point, V, applied, system.manifold.rank_of(point))
     return np.asarray(a[0]) if single else a
@@ -80,23 +80,19 @@ def constant_torque(chain: ClosedChain, tau: npt.ArrayLike | None) -> Array:
     return given.reshape(1) if given.ndim == 0 and chain.na == 1 else given
 
 
-def require_consistent(system: System, point: Point, v: Array) -> None:
-    loops, scale = system.manifold.loops, system.manifold.scale
+def require_consistent(point: Configurations, v: Array) -> None:
+    """Raise unless configurations are closed and velocities v (n, nv) keep them so.
+
+    Raises:
+        InvalidInputError: names the closure, or the rate, and the state.
+    """
+    loops = point.loops
     if not loops.m:
         return
-    gap = np.abs(point.residual).max(axis=1)
-    worst = int(np.argmax(gap))
-    if gap[worst] > _CLOSED * max(1.0, loops.length):
-        name, size = loops.worst(point.residual[worst])
-        raise InvalidInputError(
-            f"closure {name} at state {worst}",
-            size,
-            f"must be below {_CLOSED:g} m or rad",
-            "Use assemble, or simulate(initial='project').",
-        )
-    u = v / scale
-    rate = np.abs(point.s * np.einsum("nrk,nk->nr", point.Vt[:, : point.s.shape[1]], u)).max(axis=1)
-    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), 1e-300)
+    require_closed(point)
+    u = v / loops.column_scale
+    rate = point.independent.rate(u)
+    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), TINY)
     worst = int(np.argmax(rate - bound))
     if rate[worst] > bound[worst]:
         raise InvalidInputError(
@@ -104,4 +100,22 @@ def require_consistent(system: System, point: Point, v: Array) -> None:
             float(rate[worst]),
             "must vanish: this velocity opens the loops",
             "Use v = complement(chain, q) @ v_actuated, or simulate(initial='project').",
+        )
+
+
+def require_closed(point: Configurations) -> None:
+    """Raise unless configurations are closed.
+
+    Raises:
+        InvalidInputError: names the closure and the state.
+    """
+    loops = point.loops
+    worst = int(np.argmax(point.gap)) if point.gap.size else 0
+    if loops.m and point.gap.size and not closed_enough(loops, point.gap, _CLOSED)[worst]:
+        name, size = loops.worst(point.residual[worst])
+        raise InvalidInputError(
+            f"closure {name} at state {worst}",
+            size,
+            f"must be below {_CLOSED:g} m or rad",
+            "Use assemble, or simulate(initial='project').",
         )

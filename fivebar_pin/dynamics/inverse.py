@@ -12,20 +12,19 @@ Frame force and moment are all that the mechanism exerts on the frame; motors an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import checked, finite, frozen
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.elastic import checked_springs, spring_forces
+from fivebar_pin.dynamics.elastic import spring_forces
 from fivebar_pin.dynamics.loads import Loads
 from fivebar_pin.dynamics.losses import friction_torque
 from fivebar_pin.dynamics.recursion import hanging_tree
-from fivebar_pin.dynamics.wrenches import about_point, applied_wrenches, checked_wrenches
+from fivebar_pin.dynamics.wrenches import about_point, checked_wrenches, moved_to_origin
 from fivebar_pin.mechanism.loops import loops_of
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["inverse_dynamics"]
@@ -38,11 +37,10 @@ def inverse_dynamics(
     *,
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
     external: Mapping[str, npt.ArrayLike] | None = None,
-    springs: Iterable[Spring | JointSpring] = (),
 ) -> Loads:
     """Compute the actuated torques, what shakes the frame and what it carries along a trajectory.
 
-    Gravity, armature, viscous damping and dry friction are taken from the chain's model. Springs belong to the
+    Gravity, armature, viscous damping, dry friction and springs are taken from the chain. Springs belong to the
     mechanism: what one that is anchored in the ground pulls there is part of the force on the frame, which is
     -dp/dt + m g with springs as without; they change the torques and the reactions.
 
@@ -52,14 +50,13 @@ def inverse_dynamics(
         about: point (3,) that shaking and frame moment refer to [m], world.
         external: forces applied from outside: frame name -> wrench (n, 6) or (6,), force [N] and moment [N m] in
             world axes at the frame's origin.
-        springs: springs and dampers, as `simulate` takes them.
 
     Returns:
         The loads; reactions, energies and centre of mass are computed when asked for.
 
     Raises:
         InvalidInputError: a trajectory of another mechanism, wrong shapes.
-        UnknownNameError: an external force or a spring on a frame or joint that does not exist.
+        UnknownNameError: an external force on a frame that does not exist.
         SolverError: a spring whose ends meet has a force of no direction.
     """
     n = len(trajectory)
@@ -73,15 +70,17 @@ def inverse_dynamics(
         carried -= weight
         tree_torque += weight_torque
     tree_torque += friction_torque(chain, trajectory.v)
-    applied, attached = checked_wrenches(chain, external, n), checked_springs(chain, springs)
-    if attached:
+    applied = checked_wrenches(chain, external, n)
+    if chain.springs:
         loops = loops_of(chain)
         poses = loops.tree.poses(trajectory.q)
-        tree_torque -= spring_forces(chain, loops, attached, trajectory.q, trajectory.v, poses).force
+        tree_torque -= spring_forces(chain, loops, trajectory.q, trajectory.v, poses).force
     if applied:
-        generalised, total = applied_wrenches(chain, trajectory, applied)
-        tree_torque -= generalised
-        carried += total
+        tree = loops_of(chain).tree
+        poses = tree.poses(trajectory.q)
+        acting = moved_to_origin(chain, poses, applied)
+        tree_torque -= np.sum(acting.torques(tree, poses), axis=0)
+        carried += acting.total
     torque = np.matmul(np.swapaxes(trajectory.N, 1, 2), tree_torque[..., None])[..., 0]
     frame = shaking + carried
     return Loads(
@@ -95,5 +94,4 @@ def inverse_dynamics(
         trajectory=trajectory,
         tree_torque=frozen(tree_torque),
         external=applied,
-        springs=attached,
     )

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
-from fivebar_pin._arrays import Array, Immutable, cross, figures, finite, frozen, settled
+from fivebar_pin._arrays import TINY, Array, Immutable, cross, figures, finite, frozen, settled
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, sizes, speeds, total_centre
+from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, rotor_energy, sizes, speeds, total_centre
 from fivebar_pin.dynamics.elastic import SpringForces, spring_forces
 from fivebar_pin.dynamics.losses import friction_torque
 from fivebar_pin.dynamics.reactions import Reactions, determinate, reactions
-from fivebar_pin.dynamics.wrenches import applied_sizes, on_ground
+from fivebar_pin.dynamics.wrenches import moved_to_origin
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Loads"]
@@ -36,7 +36,6 @@ class Loads(Immutable):
         about: the point the moments refer to (3,) [m].
         chain, trajectory: what the loads belong to.
         external: wrenches (n, 6) by frame name, as given to `inverse_dynamics`.
-        springs: as given to `inverse_dynamics`.
 
     The armature of a joint is inertia that its motor feels: it counts in torque and `rotor_energy` and carries no
     momentum. A geared rotor that shall count in the shaking moment is modelled as a body.
@@ -52,7 +51,6 @@ class Loads(Immutable):
     trajectory: Trajectory
     tree_torque: Array = field(repr=False)
     external: Mapping[str, Array] = field(default_factory=dict, repr=False)
-    springs: tuple[Spring | JointSpring, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         names = ("torque", "shaking_force", "shaking_moment", *(("frame_force", "frame_moment") if self.loaded else ()))
@@ -75,7 +73,17 @@ class Loads(Immutable):
     @cached_property
     def reactions(self) -> Reactions:
         """Closure forces and joint reactions; components that the model leaves open are nan."""
-        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external, self.springs)
+        return reactions(self.chain, self.trajectory, self.tree_torque, self.torque, self.external)
+
+    def torque_of(self, joint: str) -> Array:
+        """Return the torque of one actuated joint (n,) [N m or N].
+
+        Raises:
+            UnknownNameError: it is not one of the actuated joints.
+        """
+        if joint not in self.chain.actuated:
+            raise UnknownNameError("actuated joint", joint, self.chain.actuated)
+        return self.torque[:, self.chain.actuated.index(joint)]
 
     @property
     def joint_reactions(self) -> Array:
@@ -101,6 +109,19 @@ class Loads(Immutable):
         return self.reactions.closure_local
 
     @cached_property
+    def multipliers(self) -> Mapping[str, Array]:
+        """Forces in the rows of every closure by its name (n, rows); nan where redundant rows leave them open.
+
+        Of a coupling sum_k c_k q_k = offset it is what is transmitted: it acts with the torque c_k lambda in joint k
+        [N m or N, divided by the unit of c_k]. Of a distance it is the force with which the rod pushes
+        its ends apart [N].
+        """
+        r = self.reactions
+        values = np.where(r.determinate_rows, r.multipliers, np.nan)
+        found = {c.closure.name: frozen(values[:, c.rows]) for c in loops_of(self.chain).anchored}
+        return MappingProxyType(found)
+
+    @cached_property
     def bearing_force(self) -> Array:
         """Force in every joint, then in every closure (n, nb + closures, 3) [N], as far as it is determinate.
 
@@ -113,12 +134,12 @@ class Loads(Immutable):
     @cached_property
     def kinetic_energy(self) -> Array:
         """Kinetic energy of the bodies (n,) [J]; that of the rotors is `rotor_energy`."""
-        return frozen(0.5 * np.sum(self._bodies.twist * self._bodies.momentum, axis=(1, 2)))
+        return frozen(self._bodies.kinetic_energy)
 
     @cached_property
     def rotor_energy(self) -> Array:
         """Kinetic energy of the rotors, where joints have an armature (n,) [J]."""
-        return frozen(0.5 * np.sum(np.array(self.chain.model.armature) * self.trajectory.v**2, axis=1))
+        return frozen(rotor_energy(self.chain, self.trajectory.v))
 
     @cached_property
     @finite()
@@ -136,7 +157,7 @@ class Loads(Immutable):
     @cached_property
     def _sprung(self) -> SpringForces:
         loops, q = loops_of(self.chain), self.trajectory.q
-        return spring_forces(self.chain, loops, self.springs, q, self.trajectory.v, loops.tree.poses(q))
+        return spring_forces(self.chain, loops, q, self.trajectory.v, loops.tree.poses(q))
 
     @cached_property
     def _bodies(self) -> BodyRates:
@@ -181,11 +202,14 @@ class Loads(Immutable):
         mass = Bodies.of(chain).mass
         force, moment, arm = sizes(moving, self.about)
         weight = mass * float(np.linalg.norm(chain.model.gravity.linear))
-        pull, turn, generalised = applied_sizes(chain, path, self.external, self.about)
-        linear, angular = speeds(loops_of(chain).tree, path.q, moving.centre, path.N)  # (n, nb, na)
+        tree = loops_of(chain).tree
+        poses = tree.poses(path.q)
+        acting = moved_to_origin(chain, poses, self.external)
+        pull, turn = acting.sizes(self.about)
+        linear, angular = speeds(tree, path.q, moving.centre, path.N)  # (n, nb, na)
         work = np.sum((force + weight)[..., None] * linear + moment[..., None] * angular, axis=1)
         other = np.abs(np.array(chain.model.armature) * path.a) + np.abs(friction_torque(chain, path.v))
-        other = other + np.abs(self._sprung.force) + generalised
+        other = other + self._sprung.size + np.abs(acting.torques(tree, poses)).sum(axis=0)
         shaking, about = force.sum(axis=1), np.sum(moment + arm * force, axis=1)
         return {
             "torque": (work + np.einsum("nvk,nv->nk", np.abs(path.N), other)).max(axis=1, initial=0.0),
@@ -193,7 +217,7 @@ class Loads(Immutable):
             "shaking_moment": about,
             "frame_force": shaking + weight.sum() + pull,
             "frame_moment": about + arm @ weight + turn,
-            "travel": np.linalg.norm(moving.centre, axis=2) @ mass / max(float(mass.sum()), 1e-300),
+            "travel": np.linalg.norm(moving.centre, axis=2) @ mass / max(float(mass.sum()), TINY),
         }
 
     def power_residual(self) -> float:
@@ -210,12 +234,13 @@ class Loads(Immutable):
         lost = lost + np.array(self.chain.model.armature) * self.trajectory.a * self.trajectory.v
         mismatch = np.abs(supplied.sum(axis=1) - lost.sum(axis=1) - rate.sum(axis=1))
         scale = np.abs(supplied).sum(axis=1) + np.abs(rate).sum(axis=1)
-        return float(np.max(mismatch) / max(float(np.max(scale)), 1e-300))
+        return float(np.max(mismatch) / max(float(np.max(scale)), TINY))
 
     def momentum_residual(self) -> float:
         """Return the largest mismatch of shaking and frame wrench with sums over the bodies, relative [-]."""
         r = self.reactions
-        applied = r.external.sum(axis=1) + on_ground(self.chain, self.external, len(self.trajectory))
+        poses = loops_of(self.chain).tree.poses(self.trajectory.q)
+        applied = r.external.sum(axis=1) + moved_to_origin(self.chain, poses, self.external).on_ground
         shaking = -np.sum(r.bodies.rate, axis=1)
         mismatch = 0.0
         for wrench, force, moment in (
@@ -226,4 +251,4 @@ class Loads(Immutable):
             off = float(np.abs(wrench[:, :3] - force).max()), float(np.abs(about - moment).max()) / self.chain.length
             mismatch = max(mismatch, *off)
         sizes = (r.bodies.rate, r.gravity, applied)
-        return mismatch / max(sum(float(np.abs(x[..., :3]).max(initial=0.0)) for x in sizes), 1e-300)
+        return mismatch / max(sum(float(np.abs(x[..., :3]).max(initial=0.0)) for x in sizes), TINY)

@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, block_svd, cross, finite, frozen
-from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.closures import closure as rows
+from fivebar_pin._arrays import Array, Immutable, cross, finite, frozen
+from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_wrenches
 from fivebar_pin.dynamics.elastic import body_wrenches
-from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
+from fivebar_pin.dynamics.wrenches import moved_to_origin
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.mechanism.tree import Poses
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Reactions", "determinate", "reactions"]
@@ -29,6 +30,7 @@ class Reactions(Immutable):
 
     Attributes:
         multipliers: closure forces in the rows of J (n, m); of least norm where the closures are redundant.
+        determinate_rows: which of them are determinate (n, m).
         closure: wrench by body 1 on body 2 at the closure point (n, closures, 6) [N, N m].
         joint: wrench by the parent on the body of every joint, motor and joint springs included, at the joint origin
             (n, nb, 6).
@@ -47,6 +49,7 @@ class Reactions(Immutable):
     """
 
     multipliers: Array
+    determinate_rows: npt.NDArray[np.bool_]
     closure: Array
     joint: Array
     closure_local: Array
@@ -67,7 +70,6 @@ def reactions(
     tree_torque: Array,
     torque: Array,
     external: Mapping[str, Array],
-    springs: tuple[Spring | JointSpring, ...],
 ) -> Reactions:
     """Compute all reactions; see `Reactions`."""
     loops = loops_of(chain)
@@ -77,8 +79,8 @@ def reactions(
     bodies = Bodies.of(chain)
     moving = body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
-    applied = _applied(chain, poses, external, moving.rate.shape)
-    sprung = body_wrenches(chain, loops, springs, trajectory.v, poses)
+    applied = moved_to_origin(chain, poses, external).on_bodies(moving.rate.shape[1])
+    sprung = body_wrenches(chain, loops, trajectory.v, poses)
     unbalanced = np.array(tree_torque)
     unbalanced[:, loops.actuated] -= torque
     forces = _closure_forces(loops, poses, unbalanced)
@@ -89,6 +91,7 @@ def reactions(
     joint = _seen(carried, slack, np.stack(poses.p[1:], axis=1), np.stack(poses.R[1:], axis=1), unit)
     return Reactions(
         forces.multipliers,
+        forces.determinate_rows,
         closure[0],
         joint[0],
         closure[1],
@@ -106,6 +109,7 @@ def reactions(
 @dataclass(frozen=True, slots=True, eq=False)
 class _ClosureForces:
     multipliers: Array  # (n, m)
+    determinate_rows: npt.NDArray[np.bool_]  # (n, m)
     wrench: Array  # on body 2, at the world origin (n, nc, 6)
     free: Array  # what redundant closures could carry besides, for a basis of unit forces (n, k, nc, 6)
     point: Array  # of the closures (n, nc, 3)
@@ -119,42 +123,32 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     if not loops.m:
         none = np.zeros((n, 0, 6))
         mismatch = float(np.abs(unbalanced).max(initial=0.0))
-        return _ClosureForces(np.zeros((n, 0)), none, none[:, None], none[..., :3], np.zeros((n, 0, 3, 3)), mismatch)
+        axes, rows = np.zeros((n, 0, 3, 3)), np.zeros((n, 0), dtype=np.bool_)
+        return _ClosureForces(np.zeros((n, 0)), rows, none, none[:, None], none[..., :3], axes, mismatch)
     pairs = loops.pairs(poses)
     J = loops.jacobian(poses, pairs)
-    scaled = loops.row_scale[:, None] * J * loops.column_scale
-    U, s, Vt = [x[None] for x in block_svd(scaled[0])] if n == 1 else np.linalg.svd(scaled, full_matrices=True)
-    rank = int(np.min(np.sum(s > RANK_TOLERANCE * np.maximum(s[:, :1], 1e-300), axis=1)))
-    k = s.shape[1]
-    inverse = np.where(np.arange(k) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)
-    loaded = np.matmul(Vt[:, :k], (unbalanced * loops.column_scale)[..., None])[..., 0] * inverse
-    multipliers = np.matmul(U[:, :, :k], loaded[..., None])[..., 0] * loops.row_scale
-    null = np.swapaxes(U[:, :, rank:], 1, 2) * loops.row_scale * loops.length  # (n, k, m)
+    decomposed = Decomposed.of(loops.scaled(J))
+    rank = decomposed.rank
+    multipliers = decomposed.carry(unbalanced * loops.column_scale, rank) * loops.row_scale
+    free_rows = decomposed.left_null(rank)
+    determinate_rows = np.linalg.norm(free_rows, axis=1) <= _OPEN
+    determinate_rows.setflags(write=False)
+    null = free_rows * loops.row_scale * loops.length  # (n, k, m)
     wrench, free = [], []
     for anchored, pair in zip(loops.anchored, pairs, strict=True):
-        T = rows.selector(anchored.closure, pair)
+        T = anchored.selector(pair)
         wrench.append(np.einsum("nmi,nm->ni", T, multipliers[:, anchored.rows]))
         free.append(np.einsum("nmi,nkm->nki", T, null[:, :, anchored.rows]))
+    places = [anchored.place(pair) for anchored, pair in zip(loops.anchored, pairs, strict=True)]
     return _ClosureForces(
         frozen(multipliers),
+        determinate_rows,
         np.stack(wrench, axis=1),
         np.stack(free, axis=2),
-        np.stack([pair.p2 for pair in pairs], axis=1),
-        np.stack([pair.R1 for pair in pairs], axis=1),
+        np.stack([point for point, _ in places], axis=1),
+        np.stack([axes for _, axes in places], axis=1),
         float(np.abs(unbalanced - np.einsum("nmk,nm->nk", J, multipliers)).max(initial=0.0)),
     )
-
-
-def _applied(chain: ClosedChain, poses: Poses, external: Mapping[str, Array], shape: tuple[int, ...]) -> Array:
-    """Return the external wrench on every body at the world origin (n, nb, 6)."""
-    applied = np.zeros(shape)
-    for name, wrench in external.items():
-        frame = find_frame(chain.model, name)
-        j = int(frame.parentJoint)
-        if j:
-            point = poses.p[j] + np.matmul(poses.R[j], np.array(frame.placement.translation))
-            applied[:, j - 1] += _at_origin(wrench, point)
-    return applied
 
 
 def determinate(free: Array) -> Array:
@@ -201,10 +195,6 @@ def _subtree(chain: ClosedChain, wrench: Array) -> Array:
         if parent:
             out[..., parent - 1, :] += out[..., j - 1, :]
     return out
-
-
-def _at_origin(wrench: Array, point: Array) -> Array:
-    return np.concatenate([wrench[..., :3], wrench[..., 3:] + cross(point, wrench[..., :3])], axis=-1)
 
 
 def _at_point(wrench: Array, point: Array) -> Array:

@@ -1,6 +1,6 @@
 """Mechanisms from files and to files: URDF with a sidecar, MJCF, and the ones that ship.
 
-`fivebar_pin.io.mechanisms` holds the functions that make the shipped mechanisms, and the legs of the Solo robot.
+`fivebar_pin.shipped` holds the functions that make the shipped mechanisms, and the legs of the Solo robot.
 """
 
 from fivebar_pin.io._load import load

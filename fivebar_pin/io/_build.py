@@ -154,9 +154,6 @@ class _Builder:
             fixed = pin.Frame(joint.name, parent, frame, pin.SE3(placement), pin.FrameType.FIXED_JOINT)
             self.body(joint.child, parent, placement, self.pin.addFrame(fixed))
             return
-        if joint.mimic:
-            problem = "<mimic> is not supported; remove it to leave the joint free, or make the joint FIXED under"
-            raise FileFormatError(self.urdf, f"joint {joint.name!r}: {problem} joint_name / joint_type in the sidecar")
         inertia = self.tree.links[joint.child].inertia
         if inertia is not None and inertia.mass == 0.0:
             problem = f"link {joint.child!r}: mass = 0 on a moving link; give it a mass, or leave <inertial> out"

@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
+from fivebar_pin.closures import Coupling
 from fivebar_pin.io._xml import UNLIMITED
 
 __all__ = ["UNIVERSE", "UNLIMITED", "JointEntry", "LinkEntry", "TreeEntry", "matrix_to_rpy", "rpy_to_matrix"]
@@ -36,7 +37,7 @@ class JointEntry:
         placement: pose of the joint in the parent link, homogeneous (4, 4).
         axis: unit axis in the joint's own axes (3,).
         data: limits and losses by name, each a list per coordinate or degree of freedom.
-        mimic: the file couples it to another joint.
+        mimic: the coupling by which the file ties it to another joint, or None.
     """
 
     name: str
@@ -46,7 +47,7 @@ class JointEntry:
     placement: Array
     axis: Array
     data: dict[str, list[float]] = field(default_factory=dict)
-    mimic: bool = False
+    mimic: Coupling | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

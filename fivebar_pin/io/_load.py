@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy.typing as npt
@@ -10,14 +11,16 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import checked
 from fivebar_pin._files import MAX_BYTES, as_path
-from fivebar_pin.chain import ClosedChain, Visual, frames_by_name
+from fivebar_pin.chain import ClosedChain, Geometry, Visual, frames_by_name
+from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
-from fivebar_pin.io._entries import TreeEntry
+from fivebar_pin.io._entries import UNLIMITED, TreeEntry
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import Sidecar, read_sidecar
 from fivebar_pin.io._urdf import read_urdf
+from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["load"]
 
@@ -38,7 +41,8 @@ def load(
             under the same name (.yaml or .yml), or as the folder's only sidecar; an MJCF .xml file; or the name of a
             mechanism that ships (`shipped`), where no file or folder is called so.
         free_flyer: put the root of a URDF on a free-flying base.
-        closures: use these instead of the file's closures; with `actuated`, no sidecar is needed.
+        closures: use these instead of the file's closures, among them the couplings that <mimic> states in a URDF;
+            with `actuated`, no sidecar is needed.
         actuated: drive these joints instead of the file's.
         gravity: use this (3,) [m/s2] instead of the file's.
         max_bytes: size above which a URDF or MJCF file is not read.
@@ -52,7 +56,7 @@ def load(
             has this name.
     """
     where = _named(as_path(path))
-    file = _mechanism_file(where)
+    file = mechanism_file(where)
     given_closures = None if closures is None else _closures(closures)
     given_actuated = None if actuated is None else _names(actuated)
     if file.suffix.lower() == ".xml":
@@ -96,7 +100,7 @@ def _named(path: Path) -> Path:
     return shipped_path(path.name)
 
 
-def _mechanism_file(path: Path) -> Path:
+def mechanism_file(path: Path) -> Path:
     """Return the URDF or MJCF file that `path` means."""
     try:
         is_folder, exists = path.is_dir(), path.exists()
@@ -126,7 +130,8 @@ def _in_folder(folder: Path, endings: tuple[str, ...]) -> list[Path]:
         raise FileFormatError(folder, f"cannot be listed ({error.strerror or error})") from error
 
 
-def _sidecar_file(urdf: Path) -> Path | None:
+def sidecar_file(urdf: Path) -> Path | None:
+    """Return the sidecar that is read with a URDF: of the same name, or the only one of a folder with one URDF."""
     beside = _in_folder(urdf.parent, (".yaml", ".yml"))
     same = [f for f in beside if f.stem == urdf.stem]
     if len(same) > 1:
@@ -145,7 +150,7 @@ def _load_urdf(
     max_bytes: int,
 ) -> ClosedChain:
     tree = read_urdf(urdf, max_bytes=max_bytes)
-    beside = _sidecar_file(urdf)
+    beside = sidecar_file(urdf)
     if beside is None and (closures is None or actuated is None):
         raise FileFormatError(
             urdf,
@@ -154,20 +159,43 @@ def _load_urdf(
         )
     sidecar = Sidecar() if beside is None else read_sidecar(beside)
     note = beside or urdf
+    stated = (*sidecar.closures, *_mimics(tree, sidecar))
+    tree = _counting(tree, stated if closures is None else closures)
     model = build_model(tree, sidecar, free_flyer=free_flyer, urdf=urdf, beside=note)
     if closures is None:
         check_closures(model, sidecar.closures, note, "closed_loop")
+        check_closures(model, stated[len(sidecar.closures) :], urdf, "mimic")
     if actuated is None:
         check_actuated(model, tree, sidecar, note)
+    check_springs(model, sidecar.springs, note)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     return make_chain(
         model,
-        sidecar.closures if closures is None else closures,
+        stated if closures is None else closures,
         sidecar.actuated if actuated is None else actuated,
         visuals,
         urdf,
         argument=closures is not None or actuated is not None,
+        springs=sidecar.springs,
+        geometry=sidecar.geometry,
     )
+
+
+def _mimics(tree: TreeEntry, sidecar: Sidecar) -> tuple[Closure, ...]:
+    """Return the couplings of joints that mimic others, unless the joint does not move."""
+    fixed = {name for name, word in sidecar.joint_types.items() if word == "FIXED"}
+    moving = [j for j in tree.joints.values() if j.kind != "fixed" and j.name not in fixed]
+    return tuple(j.mimic for j in moving if j.mimic is not None)
+
+
+def _counting(tree: TreeEntry, closures: tuple[Closure, ...]) -> TreeEntry:
+    """Return the tree with the continuous joints of couplings counting their turns: revolute, without limits."""
+    joints = dict(tree.joints)
+    for name in {name for closure in closures for name in closure.counted}:
+        if name in joints and joints[name].kind == "continuous":
+            data = {**joints[name].data, "lower": [-UNLIMITED], "upper": [UNLIMITED]}
+            joints[name] = replace(joints[name], kind="revolute", data=data)
+    return replace(tree, joints=joints)
 
 
 def make_chain(
@@ -178,10 +206,13 @@ def make_chain(
     file: Path,
     *,
     argument: bool,
+    springs: tuple[Spring | JointSpring, ...] = (),
+    geometry: Geometry | None = None,
 ) -> ClosedChain:
     """Return the chain; what is wrong with the file's own content is told as an error of the file."""
+    named = Geometry() if geometry is None else geometry
     try:
-        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals)
+        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, springs=springs, geometry=named)
     except FileFormatError:
         raise
     except FiveBarPinError as error:
@@ -191,22 +222,20 @@ def make_chain(
 
 
 def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
-    """Refuse closure frames that do not exist, are ambiguous (a link's name never is), or lie on one body."""
+    """Refuse closures that do not fit the model, or name frames that are ambiguous (a link's name never is)."""
     frames: dict[str, list[pin.Frame]] = {}
     named = frames_by_name(model) if closures else {}
     for frame in model.frames:
         frames.setdefault(frame.name, []).append(frame)
     for k, closure in enumerate(closures):
-        for name in closure.frames:
-            if name not in frames:
-                raise FileFormatError(file, f"{key}[{k}]: {UnknownNameError('frame', name, frames)}")
+        try:
+            closure.check(model, named)
+        except FiveBarPinError as error:
+            raise FileFormatError(file, f"{key}[{k}]: {error}") from error
+        for name in closure.ends:
             same = [f for f in frames[name] if f.type not in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)]
             if len(same) > 1:
                 raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
-        joints = [named[name].parentJoint for name in closure.frames]
-        if joints[0] == joints[1]:
-            body = model.names[joints[0]]
-            raise FileFormatError(file, f"{key}[{k}]: {list(closure.frames)} are two frames of one body ({body})")
 
 
 def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Path) -> None:
@@ -224,3 +253,12 @@ def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Pa
             raise FileFormatError(file, f"name_mot: {name!r} is not a joint that moves ({how}); it cannot be driven")
         else:
             raise FileFormatError(file, "name_mot: " + str(UnknownNameError("joint", name, joints)))
+
+
+def check_springs(model: pin.Model, springs: tuple[Spring | JointSpring, ...], file: Path) -> None:
+    """Refuse springs on frames or joints that do not exist, or that a chain cannot have."""
+    for k, spring in enumerate(springs):
+        try:
+            checked_springs(model, (spring,))
+        except FiveBarPinError as error:
+            raise FileFormatError(file, f"springs[{k}]: {error}") from error

@@ -11,29 +11,31 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._build import build_model
+from fivebar_pin.io._mjcf_equality import Equality, check_tendons
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
-from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
+from fivebar_pin.io._mjcf_springs import tendon_springs
+from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._sidecar import Sidecar
 from fivebar_pin.io._xml import parse_xml
+from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["HINGE", "ORDER", "UNBOUNDED", "read_mjcf"]
+__all__ = ["ORDER", "UNBOUNDED", "read_mjcf"]
 
-HINGE, UNBOUNDED, ORDER = "revolute closure ", "unbounded ", "joint order"
+UNBOUNDED, ORDER = "unbounded ", "joint order"
 """Names of <custom><numeric> entries that our writer makes.
 
-The axis of a hinge made of two connects; a hinge whose coordinates are cosine and sine; for each joint its place in the
-file's order, when the chain has them in another.
+A hinge whose coordinates are cosine and sine; for each joint its place in the file's order, when the chain has them in
+another.
 """
 
 _SECTIONS = (
     "actuator", "asset", "compiler", "contact", "custom", "default", "equality", "keyframe", "option", "sensor", "size",
-    "statistic", "visual", "worldbody",
+    "statistic", "tendon", "visual", "worldbody",
 )  # fmt: skip
 _REFUSED = {
-    "tendon": "tendons are not supported; remove the section or model them as forces",
     "deformable": "deformable bodies are not supported",
     "include": "included files are not read; merge them into this one",
     "extension": "plugins are not supported",
@@ -55,27 +57,30 @@ def read_mjcf(
     """Return the chain that an MJCF file describes; see `fivebar_pin.io.load`.
 
     Coordinates are in MuJoCo's order. Read: bodies, hinge / slide / ball / free joints with their limits and losses,
-    inertias stated or from solid geoms, default classes, connect and weld, keyframes. Contacts, cameras, lights and
-    sensors are not part of a mechanism and are passed over. Whatever else acts on it is refused by name.
+    inertias stated or from solid geoms, default classes, keyframes, the equalities connect, weld, joint and tendon,
+    springs of joints, and spatial tendons between two sites as springs. Contacts, cameras, lights and sensors are not
+    part of a mechanism and are passed over. Whatever else acts on it is refused by name.
     """
     root = parse_xml(path, root="mujoco", max_bytes=max_bytes)
     reader = MjcfReader(path, root)
     _check_sections(reader, root)
+    check_tendons(reader, root)
     bodies = BodyTree(reader, _meshes(reader, root))
     for worldbody in root.findall("worldbody"):
         bodies.world(worldbody)
     if not bodies.order:
         raise FileFormatError(path, "has no joint in its <worldbody>")
     _unbounded(reader, root, bodies)
-    found = _Equality(reader, root, bodies).closures() if closures is None else closures
+    found = Equality(reader, root, bodies).closures() if closures is None else closures
     driven = _actuated(reader, root, bodies) if actuated is None else actuated
     tree = bodies.tree(root.get("model") or path.stem)
     sidecar = Sidecar(gravity=_gravity(reader, root), joint_order=_order(reader, root, bodies), joint_data=bodies.data)
     model = build_model(tree, sidecar, free_flyer=False, urdf=path, beside=path)
     _keyframes(reader, root, model, bodies.order)
+    springs: tuple[Spring | JointSpring, ...] = (*tendon_springs(reader, root, bodies, model), *bodies.springs)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     try:
-        return ClosedChain(model, found, driven, name=tree.name, visuals=visuals)
+        return ClosedChain(model, found, driven, name=tree.name, visuals=visuals, springs=springs)
     except FiveBarPinError as error:
         if closures is not None or actuated is not None:
             raise
@@ -138,6 +143,8 @@ def _unbounded(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) 
             joint = bodies.joints.get(name[len(UNBOUNDED) :])
             if joint is None or joint.kind != "revolute":
                 raise reader.fail(f"custom {name!r}", "names no hinge of this file")
+            if any(spring.joint == joint.name for spring in bodies.springs):
+                raise reader.fail(f"joint {joint.name!r}", "stiffness of a hinge that does not count its turns")
             data = {word: joint.data[word] for word in ("effort", "velocity")}
             bodies.joints[joint.name] = replace(joint, kind="continuous", data=data)
 
@@ -189,85 +196,3 @@ def _from_qpos(reader: MjcfReader, model: pin.Model, qpos: Array, order: list[st
         else:
             parts[j] = np.roll(quaternion, -1)
     return np.concatenate([parts[j] for j in sorted(parts)])
-
-
-class _Equality:
-    """Turns the equality section into closures, adding the frames that it implies."""
-
-    def __init__(self, reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> None:
-        self.reader, self.bodies = reader, bodies
-        self.elements = root.findall("equality/*")
-        self.hinges: dict[str, list[float]] = {}
-        for numeric in root.findall("custom/numeric"):
-            name = numeric.get("name", "")
-            if name.startswith(HINGE):
-                self.hinges[name[len(HINGE) :]] = reader.numbers(numeric, "data", 3, f"custom {name!r}", None)
-
-    def closures(self) -> tuple[Closure, ...]:
-        """Return one closure per connect or weld; two connects marked as a hinge give one revolute closure."""
-        closures: list[Closure] = []
-        for k, element in enumerate(self.elements):
-            name = element.get("name") or f"{element.tag}_{k}"
-            where = f"{element.tag} {name!r}"
-            if element.tag not in ("connect", "weld"):
-                what = {"joint": "couples the coordinates of joints", "tendon": "couples tendons"}.get(
-                    element.tag, "is"
-                )
-                raise self.reader.fail(where, f"{what}, not two frames; only connect and weld are supported, remove it")
-            full = self.reader.with_defaults(element, None)
-            if full.get("active", "true") != "true":
-                raise self.reader.fail(where, "is not active; remove it or make it active")
-            if name.endswith(" axis") and name[: -len(" axis")] in self.hinges:
-                continue
-            kind = ClosureKind.POINT if element.tag == "connect" else ClosureKind.WELD
-            frames = self.frames(full, name, where)
-            axis = self.hinges.get(name)
-            try:
-                if axis is not None and kind is ClosureKind.POINT:
-                    if not any(e.get("name") == f"{name} axis" for e in self.elements):
-                        raise self.reader.fail(
-                            where, f"is marked as a hinge but lacks its second connect {name + ' axis'!r}"
-                        )
-                    closures.append(Closure(frames, ClosureKind.REVOLUTE, axis, name))
-                else:
-                    closures.append(Closure(frames, kind, name=name))
-            except FileFormatError:
-                raise
-            except FiveBarPinError as error:
-                raise self.reader.fail(where, str(error)) from error
-        return tuple(closures)
-
-    def frames(self, element: ElementTree.Element, name: str, where: str) -> tuple[str, str]:
-        sites = [element.get("site1"), element.get("site2")]
-        if any(sites):
-            for site in sites:
-                if site not in self.bodies.sites:
-                    raise self.reader.fail(where, str(UnknownNameError("site", site, self.bodies.sites)))
-            return self.bodies.sites[str(sites[0])], self.bodies.sites[str(sites[1])]
-        links = []
-        for word in ("body1", "body2"):
-            body = element.get(word, WORLD if word == "body2" else "")
-            if body not in self.bodies.bodies:
-                raise self.reader.fail(where, str(UnknownNameError("body", body, self.bodies.bodies)))
-            links.append(self.bodies.bodies[body])
-        if links[0] == links[1]:
-            raise self.reader.fail(where, f"joins body {links[0]!r} to itself")
-        first, second = (self.bodies.poses[link] for link in links)
-        if element.tag == "connect":
-            anchor = np.array(self.reader.numbers(element, "anchor", 3, where, None))
-            one = homogeneous(anchor, np.eye(3))
-            two = np.linalg.inv(second) @ first @ one
-        else:
-            one, two = self.weld(element, first, second, where)
-        return self.bodies.frame(f"{name}_1", links[0], one), self.bodies.frame(f"{name}_2", links[1], two)
-
-    def weld(self, element: ElementTree.Element, first: Array, second: Array, where: str) -> tuple[Array, Array]:
-        """Return the frames that a weld makes coincide.
-
-        On body 2 the anchor; on body 1 the relpose, which is where MuJoCo holds the anchor, or where it is now.
-        """
-        values = np.array(self.reader.numbers(element, "relpose", 7, where, [0.0] * 7))
-        anchor = homogeneous(np.array(self.reader.numbers(element, "anchor", 3, where, [0.0] * 3)), np.eye(3))
-        if np.any(values[3:]):
-            return homogeneous(values[:3], quaternion_matrix(self.reader.unit(values[3:], "relpose", where))), anchor
-        return np.linalg.inv(first) @ second @ anchor, anchor

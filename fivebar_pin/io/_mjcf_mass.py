@@ -10,7 +10,7 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.io._build import bare_inertia
-from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, turn
+from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, shortest_turn
 
 __all__ = ["geom_inertia", "geom_shape", "stated_inertia"]
 
@@ -59,10 +59,7 @@ def geom_shape(reader: MjcfReader, geom: ElementTree.Element, where: str) -> tup
         along = ends[0] - ends[1]
         length = float(np.linalg.norm(along))
         z = reader.unit(along, "fromto", where)
-        axis = np.array([-z[1], z[0], 0.0])
-        sine = float(np.linalg.norm(axis))
-        R = turn(axis / sine if sine > 1e-10 else np.eye(3)[0], float(np.arctan2(sine, z[2])))
-        return kind, [*sizes, 0.5 * length], homogeneous(0.5 * (ends[0] + ends[1]), R)
+        return kind, [*sizes, 0.5 * length], homogeneous(0.5 * (ends[0] + ends[1]), shortest_turn(z))
     return kind, _sizes(reader, geom, count, where), reader.pose(geom, where)
 
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import UnknownNameError
-from fivebar_pin.io._xml import Reader
+from fivebar_pin.io._xml import Reader, direction
 
-__all__ = ["KNOWN", "MjcfReader", "homogeneous"]
+__all__ = ["KNOWN", "MjcfReader", "homogeneous", "shortest_turn"]
+
+_ALONG = 1e-10  # sine of an angle to the z axis below which any axis across serves [-]
 
 _POSE = "pos quat axisangle xyaxes zaxis euler"
 _ATTRIBUTES = f"""
@@ -26,6 +28,10 @@ geom      name class type contype conaffinity condim group priority size materia
 site      name class type group {_POSE} material size fromto rgba user
 connect   name class active solref solimp body1 body2 anchor site1 site2
 weld      name class active solref solimp body1 body2 relpose anchor site1 site2 torquescale
+joint_equality   name class active solref solimp joint1 joint2 polycoef
+tendon_equality  name class active solref solimp tendon1 tendon2 polycoef
+tendon    name class group limited range solreflimit solimplimit solreffriction solimpfriction margin frictionloss
+          springlength stiffness damping armature actuatorfrclimited actuatorfrcrange width material rgba user
 """
 
 
@@ -137,7 +143,7 @@ class MjcfReader(Reader):
         if word == "euler":
             return self.euler(values)
         if word == "zaxis":
-            return _shortest_turn(self.unit(values, word, where))
+            return shortest_turn(self.unit(values, word, where))
         x = self.unit(values[:3], word, where)
         y = self.unit(values[3:] - (values[3:] @ x) * x, word, where)
         return np.stack([x, y, np.cross(x, y)], axis=1)
@@ -156,10 +162,10 @@ class MjcfReader(Reader):
 
     def unit(self, values: Array, word: str, where: str) -> Array:
         """Return a vector scaled to length one; left as it is when it has that length already."""
-        length = float(np.linalg.norm(values))
-        if not 1e-9 < length < 1e9:
-            raise self.fail(where, f"{word} {values.tolist()} has no direction")
-        return values if abs(length - 1.0) < 4e-16 else values / length
+        try:
+            return direction(values)
+        except ValueError:
+            raise self.fail(where, f"{word} {values.tolist()} has no direction") from None
 
 
 def homogeneous(position: Array, R: Array) -> Array:
@@ -187,9 +193,9 @@ def turn(axis: Array, angle: float) -> Array:
     return quaternion_matrix(np.concatenate([[np.cos(half)], np.sin(half) * axis]))
 
 
-def _shortest_turn(z: Array) -> Array:
+def shortest_turn(z: Array) -> Array:
     """Return the smallest rotation that takes (0, 0, 1) to z."""
     axis = np.array([-z[1], z[0], 0.0])
     length = float(np.linalg.norm(axis))
     angle = float(np.arctan2(length, z[2]))
-    return turn(axis / length if length > 1e-10 else np.eye(3)[0], angle)
+    return turn(axis / length if length > _ALONG else np.eye(3)[0], angle)

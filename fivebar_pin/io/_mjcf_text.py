@@ -1,9 +1,8 @@
-"""A chain to MJCF text: bodies at their joints, frames as sites, closures as connect and weld.
+"""A chain to MJCF text: bodies at their joints, frames as sites, closures as equalities (see `_mjcf_words`), springs
+as tendons.
 
-A revolute closure becomes two connects, at the closure's frames and at a second point of the hinge axis; a
-<custom><numeric> entry with the axis marks the pair, so that reading gives the one revolute closure back. A second
-entry keeps the order of joints that were not added depth first. MJCF has no place for velocity limits, rotor inertias
-and gear ratios; the URDF and its sidecar keep them.
+A <custom><numeric> entry keeps the order of joints that were not added depth first. A spring on a joint is that joint's
+own. MJCF has no place for velocity limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
 """
 
 from __future__ import annotations
@@ -16,10 +15,11 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
-from fivebar_pin.closures import ClosureKind
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
-from fivebar_pin.io._mjcf import HINGE, ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf import ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf_springs import joint_springs_to_write, tendon_lines
+from fivebar_pin.io._mjcf_words import equality_lines
 from fivebar_pin.io._outline import outline
 from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
 
@@ -36,7 +36,7 @@ def mjcf_text(chain: ClosedChain, folder: Path) -> str:
     """Return the MJCF text of a chain, with meshes named relative to `folder`.
 
     Raises:
-        InvalidInputError: a joint kind that MJCF lacks, or a free joint that does not hang on the world.
+        InvalidInputError: a joint, closure kind or spring that MJCF lacks, a free joint that hangs on a body.
     """
     return _Writer(chain, folder).text()
 
@@ -51,11 +51,14 @@ class _Writer:
             self.below.setdefault(joint.parent, []).append(joint)
         self.extra_sites: dict[str, list[tuple[str, Array]]] = {}
         self.numeric: list[str] = []
+        self.tendons: list[str] = []
         self.order: list[int] = []
+        self.joint_springs = joint_springs_to_write(chain)
         self.sites = {j.child for j in self.tree.joints.values() if j.kind == "fixed"}
 
     def text(self) -> str:
-        equality = self.equality()
+        equality = [line for closure in self.chain.closures for line in equality_lines(self, closure)]
+        self.tendons += tendon_lines(self.chain, self.site)
         bodies = self.contents(self.tree.root, "    ")
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
@@ -70,6 +73,7 @@ class _Writer:
             f'  <option gravity="{gravity}"/>',
             *_section("asset", meshes),
             *_section("worldbody", bodies),
+            *_section("tendon", self.tendons),
             *_section("equality", equality),
             *_section("actuator", motors),
             *_section("keyframe", self.keyframes()),
@@ -140,8 +144,14 @@ class _Writer:
             values = np.array(getattr(model, field))[v]
             if np.ptp(values) > 0.0:
                 raise InvalidInputError(f"{word} of joint {joint.name}", values.tolist(), "must be one number in MJCF")
-            if values[0]:
-                words.append(f'{word}="{numbers(values[:1])}"')
+            value = float(values[0])
+            if word == "damping" and joint.name in self.joint_springs:
+                value += self.joint_springs[joint.name].damping
+            if value:
+                words.append(f'{word}="{numbers([value])}"')
+        if joint.name in self.joint_springs:
+            spring = self.joint_springs[joint.name]
+            words.append(f'stiffness="{numbers([spring.stiffness])}" springref="{numbers([spring.rest])}"')
         return f"{indent}<joint {' '.join(words)}/>"
 
     def limits(self, joint: JointEntry, j: int) -> list[str]:
@@ -153,20 +163,6 @@ class _Writer:
         if abs(low) < _LIMITLESS and abs(high) < _LIMITLESS and (low, high) != (0.0, 0.0):
             words.append(f'actuatorfrcrange="{numbers([low, high])}"')
         return words
-
-    def equality(self) -> list[str]:
-        lines = []
-        for closure in self.chain.closures:
-            pair = [self.site(name) for name in closure.frames]
-            lines.append(_closure("weld" if closure.kind is ClosureKind.WELD else "connect", closure.name, pair))
-            if closure.kind is ClosureKind.REVOLUTE:
-                axis = np.asarray(closure.axis)
-                offset = np.eye(4)
-                offset[:3, 3] = axis * self.chain.length
-                ends = [self.second_site(name, offset) for name in closure.frames]
-                lines.append(_closure("connect", f"{closure.name} axis", ends))
-                self.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
-        return lines
 
     def pose(self, frame: str) -> tuple[str, Array]:
         """Return the link of the body that carries a frame, and the frame's pose there."""
@@ -247,10 +243,6 @@ def _inertia(inertia: pin.Inertia) -> str:
 
 def _section(tag: str, lines: list[str]) -> list[str]:
     return [f"  <{tag}>", *lines, f"  </{tag}>"] if lines else []
-
-
-def _closure(tag: str, name: str, sites: list[str]) -> str:
-    return f"    <{tag} name={quoteattr(name)} site1={quoteattr(sites[0])} site2={quoteattr(sites[1])}/>"
 
 
 def _pose(M: Array) -> str:

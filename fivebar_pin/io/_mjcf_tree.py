@@ -9,10 +9,11 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
-from fivebar_pin.errors import UnknownNameError
+from fivebar_pin.errors import FiveBarPinError, UnknownNameError
 from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry
 from fivebar_pin.io._mjcf_mass import geom_inertia, geom_shape, stated_inertia
 from fivebar_pin.io._mjcf_reader import MjcfReader
+from fivebar_pin.springs import JointSpring
 
 __all__ = ["WORLD", "BodyTree"]
 
@@ -30,6 +31,8 @@ class BodyTree:
         poses: pose of each link in the world when every joint is at zero.
         sites: link that stands for each named site.
         data: armature and losses per joint.
+        springs: on joints, in the order of the joints.
+        rests: where the springs of hinges and slides are relaxed, whether there is one or not [rad or m].
     """
 
     def __init__(self, reader: MjcfReader, meshes: dict[str, str]) -> None:
@@ -41,6 +44,8 @@ class BodyTree:
         self.bodies: dict[str, str] = {WORLD: WORLD}
         self.sites: dict[str, str] = {}
         self.data: dict[str, dict[str, list[float]]] = {}
+        self.springs: list[JointSpring] = []
+        self.rests: dict[str, float] = {}
 
     def tree(self, name: str) -> TreeEntry:
         """Return the tree that was walked."""
@@ -128,14 +133,30 @@ class BodyTree:
             raise reader.fail(where, str(UnknownNameError("joint type", word, _KINDS)))
         if word == "free" and count > 1:
             raise reader.fail(where, "a free joint must be the only one of its body")
-        for spring in ("stiffness", "ref", "springdamper"):
-            if any(float(x) for x in _plain(reader, element, spring, where)):
-                raise reader.fail(where, f"{spring} is not supported; remove it and pass springs=... instead")
+        for attribute in ("ref", "springdamper"):
+            if any(_plain(reader, element, attribute, where)):
+                raise reader.fail(where, f"{attribute} is not supported; remove it, and state stiffness and springref")
+        self.spring(element, name, word, where)
         position = np.array(reader.numbers(element, "pos", 3, where, [0.0, 0.0, 0.0]))
         if word == "free":
             return np.zeros(3), _KINDS[word], np.array([0.0, 0.0, 1.0])
         axis = reader.unit(np.array(reader.numbers(element, "axis", 3, where, [0.0, 0.0, 1.0])), "axis", where)
         return position, _KINDS[word], axis
+
+    def spring(self, element: ElementTree.Element, name: str, word: str, where: str) -> None:
+        """Keep the spring of a joint."""
+        (stiffness,) = self.reader.numbers(element, "stiffness", 1, where, [0.0])
+        if word not in ("hinge", "slide"):
+            if stiffness:
+                raise self.reader.fail(where, f"stiffness of a {word} joint is not supported; remove it")
+            return
+        (rest,) = self.reader.numbers(element, "springref", 1, where, [0.0])
+        self.rests[name] = self.reader.angle(rest) if word == "hinge" else rest
+        try:
+            if stiffness:
+                self.springs.append(JointSpring(name, stiffness, self.rests[name]))
+        except FiveBarPinError as error:
+            raise self.reader.fail(where, str(error)) from error
 
     def limits(self, element: ElementTree.Element, kind: str, name: str) -> dict[str, list[float]]:
         reader, where = self.reader, f"joint {name!r}"

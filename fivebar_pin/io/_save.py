@@ -28,7 +28,8 @@ def save(
     """Write a chain as ``name.urdf`` with its sidecar ``name.yaml``, and as ``name.xml`` (MJCF).
 
     Read back with `load`, either is the same mechanism: the same order of coordinates, every number of the tree
-    within round-off, the same closures and driven joints.
+    within round-off, the same closures and driven joints. Named parameters stand in the sidecar; MJCF has no word
+    for them: that file is the mechanism at their present values.
 
     Args:
         chain: what to write.

@@ -1,24 +1,47 @@
 """The sidecar beside a URDF: which frames close loops, which joints are driven, and what URDF cannot say.
 
 Keys that example-parallel-robots uses: ``closed_loop``, ``type``, ``name_mot``, ``joint_name``, ``joint_type``.
-Ours, written only when needed: ``axis`` and ``closure_name`` (one entry per closure), ``gravity``, ``joint_order``,
-``joint_data`` (per joint: armature, limits and losses of joints with several coordinates) and
-``reference_configurations``.
+Ours, written only when needed: ``closure_name`` and what the kinds of closure state of themselves (``axis``,
+``length``, ``ratio``, ``offset``), one entry per closure; ``gravity``, ``joint_order``, ``joint_data`` (per joint:
+armature, limits and losses of joints with several coordinates), ``reference_configurations``, ``springs`` (each with
+``frames``, ``stiffness``, ``length`` or ``joint``, ``stiffness``, ``rest``, and ``damping`` where it has some) and
+``parameters`` (named lengths and what follows them, see `_geometry`). ``closed_loop`` names two frames, for a coupling
+any number of joints, whose ratios stand in the same order:
+
+    closed_loop: [[tip_left, tip_right], [rod_end, slider], [wheel, crank]]
+    type: [3d, distance, coupling]
+    length: [null, 0.7, null]
+    ratio: [null, null, [1.0, 3.7]]
+    offset: [null, null, 0.2]
+    name_mot: [crank]
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from fivebar_pin._files import read_bounded
-from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.chain import Geometry
+from fivebar_pin.closures import Closure
+from fivebar_pin.closures.closure import Entry
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
+from fivebar_pin.io._geometry import geometry_entries, read_geometry
 from fivebar_pin.io._xml import HUGE, UNLIMITED
+from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["DATA_FIELDS", "DATA_WORDS", "JOINT_WORDS", "UNIVERSAL", "Sidecar", "dump_sidecar", "read_sidecar"]
+__all__ = [
+    "DATA_FIELDS",
+    "DATA_WORDS",
+    "JOINT_WORDS",
+    "UNIVERSAL",
+    "Sidecar",
+    "dump_sidecar",
+    "plain_yaml",
+    "read_sidecar",
+]
 
 MAX_SIDECAR_BYTES = 1024 * 1024
 MAX_DEPTH = 20
@@ -48,8 +71,8 @@ DATA_WORDS = tuple(DATA_FIELDS)
 """What ``joint_data`` can state of a joint, and the field of pin.Model that holds it."""
 
 _KEYS = (
-    "closed_loop", "type", "name_mot", "joint_name", "joint_type", "axis", "closure_name", "gravity", "joint_order",
-    "joint_data", "reference_configurations",
+    "closed_loop", "type", "name_mot", "joint_name", "joint_type", "closure_name", "gravity", "joint_order",
+    "joint_data", "reference_configurations", "springs", "parameters",
 )  # fmt: skip
 
 
@@ -64,6 +87,8 @@ class Sidecar:
     joint_order: tuple[str, ...] | None = None
     joint_data: Mapping[str, Mapping[str, list[float]]] = field(default_factory=dict)
     configurations: Mapping[str, list[float]] = field(default_factory=dict)
+    springs: tuple[Spring | JointSpring, ...] = ()
+    geometry: Geometry = field(default_factory=Geometry)
 
 
 def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
@@ -72,7 +97,7 @@ def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
     Raises:
         FileFormatError: not YAML of plain values, an unknown or missing key, or a value of the wrong type.
     """
-    return _Check(path).sidecar(_plain_yaml(path, max_bytes))
+    return _Check(path).sidecar(plain_yaml(path, max_bytes))
 
 
 def dump_sidecar(sidecar: Sidecar) -> str:
@@ -81,16 +106,16 @@ def dump_sidecar(sidecar: Sidecar) -> str:
 
     closures = sidecar.closures
     content: dict[str, Any] = {
-        "closed_loop": [list(c.frames) for c in closures],
+        "closed_loop": [list(c.joins) for c in closures],
         "type": [c.kind.value for c in closures],
         "name_mot": list(sidecar.actuated),
     }
     if sidecar.joint_types:
         content["joint_name"] = list(sidecar.joint_types)
         content["joint_type"] = list(sidecar.joint_types.values())
-    if any(c.kind is ClosureKind.REVOLUTE for c in closures):
-        content["axis"] = [_floats(c.axis) if c.kind is ClosureKind.REVOLUTE else None for c in closures]
-    if any(c.name != Closure(c.frames).name for c in closures):
+    values = [c.values() for c in closures]
+    content |= {key: [v.get(key) for v in values] for key in _closure_keys() if any(key in v for v in values)}
+    if any(c.name != "~".join(c.joins) for c in closures):
         content["closure_name"] = [c.name for c in closures]
     if sidecar.gravity is not None:
         content["gravity"] = _floats(sidecar.gravity)
@@ -100,17 +125,34 @@ def dump_sidecar(sidecar: Sidecar) -> str:
         content["joint_data"] = {j: {k: _floats(v) for k, v in d.items()} for j, d in sidecar.joint_data.items()}
     if sidecar.configurations:
         content["reference_configurations"] = {k: _floats(v) for k, v in sidecar.configurations.items()}
+    if sidecar.springs:
+        content["springs"] = [_spring(s) for s in sidecar.springs]
+    if sidecar.geometry.parameters:
+        content["parameters"] = geometry_entries(sidecar.geometry)
     return "".join(
         yaml.safe_dump({key: value}, default_flow_style=True, width=10**6, allow_unicode=True).strip()[1:-1] + "\n"
         for key, value in content.items()
     )
 
 
+def _closure_keys() -> tuple[str, ...]:
+    """Return the keys that some kind of closure states of itself, each once."""
+    return tuple(dict.fromkeys(entry.key for kind in Closure.family.values() for entry in kind.entries))
+
+
 def _floats(values: Any) -> list[float]:
     return [float(v) for v in values]
 
 
-def _plain_yaml(path: Path, max_bytes: int) -> object:
+def _spring(spring: Spring | JointSpring) -> dict[str, Any]:
+    """Return the plain entry of a spring, without a damping of zero."""
+    ends: dict[str, Any] = {"frames": [spring.frame1, spring.frame2]} if isinstance(spring, Spring) else {}
+    rest = {f.name: getattr(spring, f.name) for f in fields(spring) if f.name not in ("frame1", "frame2")}
+    entry = ends | {word: x if isinstance(x, str) else float(x) for word, x in rest.items()}
+    return entry if spring.damping else {word: x for word, x in entry.items() if word != "damping"}
+
+
+def plain_yaml(path: Path, max_bytes: int) -> object:
     """Return the one document of a YAML file, without aliases, tags, doubled keys or deep nests."""
     import yaml
 
@@ -155,9 +197,10 @@ class _Check:
     def sidecar(self, content: object) -> Sidecar:
         if not isinstance(content, dict):
             raise FileFormatError(self.path, f"holds {_kind(content)}; expected the keys closed_loop, type, name_mot")
+        known = (*_KEYS, *_closure_keys())
         for key in content:
-            if key not in _KEYS:
-                raise FileFormatError(self.path, str(UnknownNameError("sidecar key", key, _KEYS)))
+            if key not in known:
+                raise FileFormatError(self.path, str(UnknownNameError("sidecar key", key, known)))
         for key in ("closed_loop", "type", "name_mot"):
             if key not in content:
                 raise self.fail(key, "is missing; write an empty list [] if there are none")
@@ -170,27 +213,41 @@ class _Check:
             joint_order=None if order is None else tuple(self.names("joint_order", order)),
             joint_data=self.joint_data(content.get("joint_data")),
             configurations=self.configurations(content.get("reference_configurations")),
+            springs=self.springs(content.get("springs")),
+            geometry=read_geometry(self, content.get("parameters")),
         )
 
     def closures(self, content: dict[str, Any]) -> tuple[Closure, ...]:
-        pairs = self.sequence("closed_loop", content["closed_loop"])
-        kinds = self.names("type", content["type"], len(pairs))
-        axes = self.sequence("axis", content.get("axis") or [None] * len(pairs), len(pairs))
-        names = self.names("closure_name", content.get("closure_name") or [""] * len(pairs), len(pairs))
+        loops = self.sequence("closed_loop", content["closed_loop"])
+        n = len(loops)
+        kinds = self.names("type", content["type"], n)
+        names = self.names("closure_name", content.get("closure_name") or [""] * n, n)
+        stated = {key: self.sequence(key, content.get(key) or [None] * n, n) for key in _closure_keys()}
         closures = []
-        for k, (pair, word, axis, name) in enumerate(zip(pairs, kinds, axes, names, strict=True)):
-            first, second = self.names(f"closed_loop[{k}]", pair, 2)
+        for k, (loop, word, name) in enumerate(zip(loops, kinds, names, strict=True)):
+            where = f"closed_loop[{k}]"
             try:
-                kind = ClosureKind.parse(word)
-                if kind is ClosureKind.REVOLUTE and axis is None:
-                    raise self.fail(f"axis[{k}]", "is missing; a revolute closure needs its hinge axis, e.g. [0, 0, 1]")
-                direction = (0.0, 0.0, 1.0) if axis is None else self.numbers(f"axis[{k}]", axis, 3)
-                closures.append(Closure((first, second), kind, direction, name))
+                kind = Closure.of_kind(word)
+                joins = self.names(where, loop, kind.joined)
+                values = {e.key: self.entry(e, stated[e.key][k], k, len(joins)) for e in kind.entries}
+                given = {key: value for key, value in values.items() if value is not None}
+                closures.append(kind.of_entry(joins, given, name))
             except FileFormatError:
                 raise
             except FiveBarPinError as error:
-                raise self.fail(f"closed_loop[{k}]", str(error)) from error
+                raise self.fail(where, str(error)) from error
         return tuple(closures)
+
+    def entry(self, entry: Entry, value: object, k: int, joined: int) -> float | list[float] | None:
+        """Return what a key states of closure k, which joins so many things."""
+        where = f"{entry.key}[{k}]"
+        if value is None:
+            if entry.needed:
+                raise self.fail(where, f"is missing; {entry.needed}")
+            return None
+        if entry.size is None:
+            return self.numbers(where, [value], 1)[0]
+        return self.numbers(where, value, entry.size or joined)
 
     def joint_types(self, content: dict[str, Any]) -> dict[str, str]:
         names = self.names("joint_name", content.get("joint_name") or [])
@@ -216,6 +273,36 @@ class _Check:
     def configurations(self, value: object) -> dict[str, list[float]]:
         mapping = self.mapping("reference_configurations", value)
         return {name: self.numbers(f"reference_configurations of {name}", q) for name, q in mapping.items()}
+
+    def springs(self, value: object) -> tuple[Spring | JointSpring, ...]:
+        entries = [] if value is None else self.sequence("springs", value)
+        return tuple(self.spring(f"springs[{k}]", entry) for k, entry in enumerate(entries))
+
+    def spring(self, key: str, value: object) -> Spring | JointSpring:
+        entry = self.mapping(key, value)
+        on_joint = "joint" in entry
+        place = "rest" if on_joint else "length"
+        words = ("joint" if on_joint else "frames", "stiffness", place, "damping")
+        for word in entry:
+            if word not in words:
+                raise self.fail(key, str(UnknownNameError("spring data", word, words)))
+        for word in words[:3]:
+            if word not in entry:
+                raise self.fail(
+                    key, f"{word} is missing; a spring needs frames, stiffness, length or joint, stiffness, rest"
+                )
+        k, at, c = (
+            self.numbers(f"{key}, {word}", [entry.get(word, 0.0)], 1)[0] for word in ("stiffness", place, "damping")
+        )
+        try:
+            if on_joint:
+                return JointSpring(self.names(f"{key}, joint", [entry["joint"]])[0], k, at, c)
+            first, second = self.names(f"{key}, frames", entry["frames"], 2)
+            return Spring(first, second, k, at, c)
+        except FileFormatError:
+            raise
+        except FiveBarPinError as error:
+            raise self.fail(key, str(error)) from error
 
     def mapping(self, key: str, value: object) -> dict[str, Any]:
         if value is None:

@@ -11,10 +11,11 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import Visual
+from fivebar_pin.closures import Coupling
 from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import bare_inertia
 from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
-from fivebar_pin.io._xml import Reader, parse_xml
+from fivebar_pin.io._xml import UNIT, Reader, direction, parse_xml
 
 __all__ = ["read_urdf"]
 
@@ -151,7 +152,22 @@ def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
     placement = _homogeneous(*_origin(reader, element, where))
     axis = _axis(reader, element, kind, where)
     data = _joint_data(reader, element, kind, where)
-    return JointEntry(name, kind, ends[0], ends[1], placement, axis, data, element.find("mimic") is not None)
+    return JointEntry(name, kind, ends[0], ends[1], placement, axis, data, _mimic(reader, element, name, where))
+
+
+def _mimic(reader: Reader, element: ElementTree.Element, name: str, where: str) -> Coupling | None:
+    """Return q - multiplier q_other = offset, as <mimic> states it."""
+    mimic = reader.only(element, "mimic", where)
+    if mimic is None:
+        return None
+    reader.known(mimic, ("joint", "multiplier", "offset"), where)
+    other = reader.text(mimic, "joint", where)
+    if other == name:
+        raise reader.fail(where, "mimics itself")
+    (multiplier,) = reader.numbers(mimic, "multiplier", 1, where, [1.0])
+    (offset,) = reader.numbers(mimic, "offset", 1, where, [0.0])
+    tied = {other: -multiplier} if multiplier else {}
+    return Coupling({name: 1.0, **tied}, offset, name=f"{name} mimic")
 
 
 def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> Array:
@@ -160,12 +176,13 @@ def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -
     axis = np.array(reader.numbers(stated, "xyz", 3, where, [1.0, 0.0, 0.0]))
     if kind in ("fixed", "floating"):
         return axis
-    length = float(np.linalg.norm(axis))
-    if not 1e-9 < length < 1e9:
-        raise reader.fail(where, f"axis {axis.tolist()} has no direction")
-    if kind == "planar" and not np.array_equal(axis / length, [0.0, 0.0, 1.0]):
+    try:
+        unit = direction(axis)
+    except ValueError:
+        raise reader.fail(where, f"axis {axis.tolist()} has no direction") from None
+    if kind == "planar" and not np.allclose(unit, [0.0, 0.0, 1.0], rtol=0.0, atol=UNIT):
         raise reader.fail(where, "a planar joint must have the axis 0 0 1; turn its <origin> instead")
-    return axis if abs(length - 1.0) < 4e-16 else axis / length
+    return unit
 
 
 def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> dict[str, list[float]]:

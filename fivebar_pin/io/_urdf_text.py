@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -28,7 +29,7 @@ _IN_URDF = (*_IN_URDF_IF_CONTINUOUS, "lower", "upper")
 
 def urdf_and_sidecar(chain: ClosedChain, folder: Path) -> tuple[str, Sidecar]:
     """Return the URDF text of a chain, with meshes named relative to `folder`, and what only the sidecar can say."""
-    tree = outline(chain)
+    tree = _uncounted(chain, outline(chain))
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(tree.name)}>"]
     for link in tree.links.values():
         lines += _link(link, folder)
@@ -36,6 +37,20 @@ def urdf_and_sidecar(chain: ClosedChain, folder: Path) -> tuple[str, Sidecar]:
         lines += _joint(joint, chain.model)
     lines += ["</robot>", ""]
     return "\n".join(lines), _sidecar(chain, tree)
+
+
+def _uncounted(chain: ClosedChain, tree: TreeEntry) -> TreeEntry:
+    """Return the tree with the revolute joints of couplings that have no limits as continuous ones, as URDF says it.
+
+    Reading makes them count their turns again; reference configurations are those of joints that do.
+    """
+    joints, model = dict(tree.joints), chain.model
+    for name in {name for closure in chain.closures for name in closure.counted}:
+        k = model.idx_qs[model.getJointId(name)]
+        limited = model.lowerPositionLimit[k] > -UNLIMITED or model.upperPositionLimit[k] < UNLIMITED
+        if joints[name].kind == "revolute" and not limited:
+            joints[name] = replace(joints[name], kind="continuous")
+    return replace(tree, joints=joints)
 
 
 def numbers(values: Iterable[float] | Array) -> str:
@@ -72,6 +87,8 @@ def _sidecar(chain: ClosedChain, tree: TreeEntry) -> Sidecar:
         joint_order=None if usual == list(chain.joints) else chain.joints,
         joint_data=data,
         configurations={name: [float(x) for x in q] for name, q in configurations(model)},
+        springs=chain.springs,
+        geometry=chain.geometry,
     )
 
 

@@ -8,14 +8,19 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
+
+from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES, read_bounded
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 
-__all__ = ["HUGE", "UNLIMITED", "Reader", "parse_xml"]
+__all__ = ["HUGE", "UNIT", "UNLIMITED", "Reader", "direction", "parse_xml"]
 
 MAX_DEPTH = 200
 MAX_ELEMENTS = 200_000
 
+UNIT = 4e-16  # deviation from length one of a vector that is left as it is [-]
+_SHORTEST, _LONGEST = 1e-9, 1e9  # lengths of a vector that has a direction [-]
 HUGE = 1e30
 """Beyond any length, mass or inertia; products of numbers below it do not overflow."""
 UNLIMITED = sys.float_info.max
@@ -147,3 +152,15 @@ class Reader:
         if len(found) > 1:
             raise self.fail(where, f"has {len(found)} <{tag}> elements; expected at most one")
         return found[0] if found else None
+
+
+def direction(values: Array) -> Array:
+    """Return a vector scaled to length one; left as it is when it has that length already.
+
+    Raises:
+        ValueError: it has no direction.
+    """
+    length = float(np.linalg.norm(values))
+    if not _SHORTEST < length < _LONGEST:
+        raise ValueError("no direction")
+    return values if abs(length - 1.0) < UNIT else values / length

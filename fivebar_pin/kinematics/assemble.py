@@ -10,14 +10,16 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
-from fivebar_pin.kinematics.branch import SINGULAR, follow, node_at
+from fivebar_pin.kinematics.branch import follow, node_at
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
-from fivebar_pin.mechanism.newton import closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.rank import SINGULAR
 
-__all__ = ["CLOSED", "assemble", "checked_search", "closed_from_starts", "closure_residual"]
+__all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual"]
 
 
-CLOSED = 1e-12  # closure residual that counts as closed [m or rad]
+_FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
 _NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
 _MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once
 
@@ -93,7 +95,8 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
 
 def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Array:
     q = np.array(near[None])
-    if closed_enough(loops, np.abs(residual_of(loops, q)).max(axis=1, initial=0.0), 1e-8)[0] if loops.m else False:
+    here = Configurations(loops, q)
+    if loops.m and closed_enough(loops, here.gap, _FOLLOWED)[0]:
         at = _actuated_at(loops, q, x)
         node = node_at(loops, q[0], at)
         if node.sigma >= SINGULAR:
@@ -102,9 +105,16 @@ def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Arr
                 raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
             loops.set_actuated(closed.q, x)
             return np.asarray(closed.q[0])
+        if np.array_equal(at, x) and closed_enough(loops, here.gap, tolerance)[0]:
+            return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
     loops.set_actuated(q, x)
     if not loops.m:
         return np.asarray(q[0])
+    return _searched_near(loops, q, x, tolerance)
+
+
+def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:
+    """Return the closed configuration (nq,) nearest to q (1, nq) that searches from there lead to."""
     for starts in (q, _nudged(loops, q, x)):  # a search that starts at a saddle stays there: step aside
         found = search(loops, starts)
         closed = polish(loops, found)

@@ -6,19 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.errors import AssemblyError, BranchError, SingularityError
-from fivebar_pin.mechanism.loops import Loops, open_message, same_side
-from fivebar_pin.mechanism.newton import Closed, closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.closing import Closed, closed_enough, polish, residual_of, search
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.loops import Loops, open_message
+from fivebar_pin.mechanism.rank import SINGULAR, same_side
 
-__all__ = ["LONGEST", "SINGULAR", "follow", "node_at", "track"]
+__all__ = ["LONGEST", "follow", "node_at", "track"]
 
 
 LONGEST = 0.4  # longest predictor step of any coordinate [rad, or chain lengths]
-SINGULAR = 1e-7  # scaled smallest singular value below which the passive motion counts as undetermined [-]
 _SHORTEST = 1e-7  # fraction of a step below which the search for a way on is given up
 _TRUST = 0.3  # largest correction, as a fraction of the step that was predicted
 _DROP = 0.2  # part of the singular value that a step must leave: a longer one may jump over a bifurcation unseen [-]
+_NOISE = 1e-9  # correction that needs no step to explain it: nodes are closed about as far [rad, or chain lengths]
+_APART = 1e-6  # distance of two closed configurations from which on they are two [rad, or chain lengths]
+_OUT_OF_REACH = 1e-8  # closure residual that a search leaves where nothing closes, at least [m or rad]
 _CORRECTIONS = 6  # Newton steps before a step counts as too long
 _GUIDED = 1e-6  # scaled residual good enough for a node on the way [-]
 _RESOLVED = 1e-2  # the same over the squared singular value: a residual r cannot tell branches sqrt(r) apart [-]
@@ -50,16 +54,12 @@ class _Corrector:
 
 
 def _correct(loops: Loops, q: Array) -> _Corrector:
-    poses = loops.tree.poses(q)
-    pairs = loops.pairs(poses)
-    blocks = loops.blocks(poses, pairs)
-    passive = loops.passive_map(blocks)
-    residual = loops.residual(pairs) if loops.m else np.zeros((1, 0))
-    error = float(np.abs(residual * loops.row_scale).max(initial=0.0))
+    here = Configurations(loops, q)
+    passive = here.passive
     return _Corrector(
-        error,
-        -passive.solve(residual)[0],
-        passive.complement(blocks)[0],
+        float(here.error[0]),
+        -passive.solve(here.residual)[0],
+        passive.complement(here.blocks)[0],
         passive.sign[0],
         [A[0] for A in passive.tall],
         float(passive.sigma[0]),
@@ -165,7 +165,7 @@ def _try(loops: Loops, node: _Node, x: Array) -> _Node | None:
         step = np.zeros(loops.tree.nv)
         step[loops.passive] = here.step
         correction += float(np.abs(step / scale).max())
-        if not correction <= _TRUST * size + 1e-9:
+        if not correction <= _TRUST * size + _NOISE:
             return None
         q = loops.tree.integrate(q, step[None])
     return None
@@ -192,8 +192,7 @@ def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, toleran
 
 def _on_the_side_of(loops: Loops, nodes: list[_Node], which: np.ndarray, q: Array) -> np.ndarray:
     """Tell whether every sample q (n, nq) lies on the side of its node where no determinant tells it (n,)."""
-    poses = loops.tree.poses(q)
-    tall = loops.passive_map(loops.blocks(poses, loops.pairs(poses))).tall
+    tall = Configurations(loops, q).passive.tall
     return same_side([np.stack([node.tall[g] for node in nodes])[which] for g in range(len(tall))], tall)
 
 
@@ -234,7 +233,7 @@ def _between(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array) -> A
     b = np.minimum(np.searchsorted(index, np.arange(n), side="right") - 1, index.size - 2)
     XN, N = X[index], np.stack([node.N for node in nodes])
     chord = XN[b + 1] - XN[b]
-    length2 = np.maximum(np.einsum("ni,ni->n", chord, chord), 1e-300)
+    length2 = np.maximum(np.einsum("ni,ni->n", chord, chord), TINY)
     s = np.clip(np.einsum("ni,ni->n", X - XN[b], chord) / length2, 0.0, 1.0)[:, None]
     span = loops.tree.difference(Q[:-1], Q[1:])[b][:, loops.passive]
     m0, m1 = (np.einsum("npa,na->np", N[b + k], chord) for k in (0, 1))
@@ -251,7 +250,7 @@ def _between(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array) -> A
 
 def _apart(loops: Loops, q0: Array, q1: Array) -> bool:
     d = loops.tree.difference(q0[None], q1[None])[0] / loops.column_scale
-    return bool(np.abs(d).max(initial=0.0) > 1e-6)
+    return bool(np.abs(d).max(initial=0.0) > _APART)
 
 
 def _blocked(loops: Loops, node: _Node, x: Array) -> AssemblyError | SingularityError:
@@ -260,7 +259,7 @@ def _blocked(loops: Loops, node: _Node, x: Array) -> AssemblyError | Singularity
     loops.set_actuated(q, x)
     found = search(loops, q)
     residual = residual_of(loops, found)[0]
-    if np.abs(residual).max(initial=0.0) > 1e-8 * max(1.0, loops.length):
+    if not closed_enough(loops, np.abs(residual).max(initial=0.0), _OUT_OF_REACH):
         return open_message(loops, residual, "at these actuated coordinates")
     return _singular(node.sigma)
 

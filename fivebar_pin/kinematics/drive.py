@@ -10,16 +10,19 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, finite
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
-from fivebar_pin.kinematics.assemble import CLOSED, assemble
+from fivebar_pin.kinematics.assemble import assemble
 from fivebar_pin.kinematics.branch import track
-from fivebar_pin.kinematics.complement import whole_complement
-from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.closing import CLOSED
+from fivebar_pin.mechanism.complement import rates_of
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["consistent", "drive"]
+__all__ = ["drive"]
 
 
+_SLACK = 1e-9  # how far beyond a limit a coordinate still lies on it: closing leaves less [rad or m]
 _BLOCK = 4096  # samples worked on at a time, so that intermediate arrays stay in cache
 
 
@@ -64,31 +67,16 @@ def drive(
     if limits == "check":
         _check_limits(chain, closed.q, motion)
     parts = [
-        consistent(loops, closed.q[k : k + _BLOCK], motion.v[k : k + _BLOCK], motion.a[k : k + _BLOCK])
+        rates_of(Configurations(loops, closed.q[k : k + _BLOCK]), motion.v[k : k + _BLOCK], motion.a[k : k + _BLOCK])
         for k in range(0, len(motion), _BLOCK)
     ]
     v, a, N = (np.concatenate(x) if len(parts) > 1 else x[0] for x in zip(*parts, strict=True))
     return Trajectory(motion.t, closed.q, v, a, N, closed.residual)
 
 
-def consistent(loops: Loops, q: Array, va: Array, aa: Array) -> tuple[Array, Array, Array]:
-    """Return v, a (n, nv) and N (n, nv, na) from the actuated rates."""
-    poses = loops.tree.poses(q)
-    pairs = loops.pairs(poses)
-    blocks = loops.blocks(poses, pairs)
-    passive = loops.passive_map(blocks)
-    N = whole_complement(loops, passive, blocks, q.shape[0])
-    v = np.matmul(N, va[..., None])[..., 0]
-    a = np.matmul(N, aa[..., None])[..., 0]
-    if loops.m:
-        a[:, loops.passive] -= passive.solve(loops.drift(pairs, loops.tree.rates(q, v, poses)))
-    return v, a, N
-
-
 def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
     lower, upper = chain.model.lowerPositionLimit, chain.model.upperPositionLimit
-    slack = 1e-9
-    bad = np.argwhere((q < lower - slack) | (q > upper + slack))
+    bad = np.argwhere((q < lower - _SLACK) | (q > upper + _SLACK))
     if bad.size:
         k, i = (int(b) for b in bad[0])
         owner = int(np.searchsorted(np.array(chain.model.idx_qs)[1:], i, side="right"))

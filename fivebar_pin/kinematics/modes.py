@@ -7,10 +7,15 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.kinematics.assemble import CLOSED, checked_search, closed_from_starts
+from fivebar_pin.kinematics.assemble import checked_search, closed_from_starts
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.mechanism.loops import Loops
+from fivebar_pin.mechanism.tree import Poses
 
 __all__ = ["assembly_modes"]
+
+
+_SAME = 1e-6  # difference of poses up to which two closed configurations are one [rad, or chain lengths]
 
 
 @finite()
@@ -41,13 +46,9 @@ def assembly_modes(
     return np.stack(modes) if modes else np.zeros((0, chain.nq))
 
 
-def _same_pose(loops: Loops, poses: object, other: Array) -> bool:
+def _same_pose(loops: Loops, poses: Poses, other: Array) -> bool:
     """Whether two configurations place every body alike (angles that differ by whole turns do)."""
-    from fivebar_pin.mechanism.tree import Poses
-
-    assert isinstance(poses, Poses)
     b = loops.tree.poses(other[None])
-    near = 1e-6
-    return all(np.abs(r - s).max() < near for r, s in zip(poses.R, b.R, strict=True)) and all(
-        np.abs(r - s).max() < near * loops.length for r, s in zip(poses.p, b.p, strict=True)
+    return all(np.abs(r - s).max() < _SAME for r, s in zip(poses.R, b.R, strict=True)) and all(
+        np.abs(r - s).max() < _SAME * loops.length for r, s in zip(poses.p, b.p, strict=True)
     )

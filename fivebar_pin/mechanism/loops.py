@@ -1,98 +1,29 @@
-"""The closures of a chain over a batch of samples, and the one place where rank is decided."""
+"""The closures of a chain over a batch of samples: residual, Jacobian, drift, and their independent groups."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, block_svd
+from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
-from fivebar_pin.closures import Closure
-from fivebar_pin.closures import closure as rows
-from fivebar_pin.closures.closure import FramePair
+from fivebar_pin.closures import Anchored
 from fivebar_pin.errors import AssemblyError, InvalidInputError
+from fivebar_pin.mechanism.passive import Group, PassiveMap, passive_map
 from fivebar_pin.mechanism.per_chain import once_per_chain
+from fivebar_pin.mechanism.rank import ranks_of, singular_values
 from fivebar_pin.mechanism.tree import Poses, Rates, Tree
 
-__all__ = ["RANK_TOLERANCE", "Loops", "PassiveMap", "inverse", "loops_of", "open_message", "same_side"]
+__all__ = ["Loops", "loops_of", "open_message"]
 
 
-RANK_TOLERANCE = 1e-9  # of the largest singular value of the scaled Jacobian [-]
-_WHOLE = 4000  # entries of a Jacobian from which on it is decomposed block by block
+_Index = npt.NDArray[np.intp] | slice
+
 _GENERIC_SAMPLES = 12
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Anchored:
-    """A closure with its frames resolved to joints."""
-
-    index: int
-    closure: Closure
-    joints: tuple[int, int]
-    R: tuple[Array, Array]
-    p: tuple[Array, Array]
-    sign: Array  # (nv,): +1 moves only body 2, -1 only body 1, 0 both or neither
-    moved: npt.NDArray[np.intp]  # columns with a sign
-    rows: slice
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Group:
-    """Closures that share passive joints; groups are independent of each other given the actuated coordinates."""
-
-    members: tuple[int, ...]  # closures
-    rows: npt.NDArray[np.intp]  # of J
-    columns: npt.NDArray[np.intp]  # velocity coordinates that move some of the rows
-    passive: npt.NDArray[np.intp]  # positions in `Loops.passive`
-    passive_columns: npt.NDArray[np.intp]  # the same, positions in `columns`
-    actuated: npt.NDArray[np.intp]  # positions in `Loops.actuated`
-    actuated_columns: npt.NDArray[np.intp]
-    reduce: Array  # independent row combinations (r, rows)
-    scale: Array  # of the passive columns
-
-    @property
-    def is_square(self) -> bool:
-        return bool(self.reduce.shape[0] == self.passive.size)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PassiveMap:
-    """What takes the actuated coordinates to the passive ones at a batch of configurations.
-
-    Attributes:
-        groups: the independent groups of closures.
-        X: per group, pseudo-inverse of the passive columns of its reduced rows (n, np_g, r_g); nan where singular.
-        sigma: lower estimate of their smallest singular value, scaled [-] (n,).
-        sign: sign of their determinant, per group; one where they are not square (n, groups).
-        tall: those that are not square, scaled (n, r_g, np_g): see `same_side`.
-        size: number of passive and actuated coordinates.
-    """
-
-    groups: list[_Group]
-    X: list[Array]
-    sigma: Array
-    sign: Array
-    tall: list[Array]
-    size: tuple[int, int]
-
-    def solve(self, rows: Array) -> Array:
-        """Return the passive tangent that changes the closure rows (n, m) by this much, (n, np)."""
-        out = np.zeros((rows.shape[0], self.size[0]))
-        for g, X in zip(self.groups, self.X, strict=True):
-            out[:, g.passive] = np.matmul(X, (rows[:, g.rows] @ g.reduce.T)[..., None])[..., 0]
-        return out
-
-    def complement(self, blocks: list[Array]) -> Array:
-        """Return the passive rows of the complement (n, np, na) from the Jacobian's blocks."""
-        out = np.zeros((self.sigma.size, *self.size))
-        for g, X, J in zip(self.groups, self.X, blocks, strict=True):
-            if g.actuated.size:
-                out[:, g.passive[:, None], g.actuated] = -np.matmul(X, np.matmul(g.reduce, J[:, :, g.actuated_columns]))
-        return out
 
 
 class Loops:
@@ -113,30 +44,14 @@ class Loops:
         self.closures = chain.closures
         self.actuated, self.passive = chain.actuated_index, chain.passive_index
         self.length = chain.length
-        self.anchored: list[_Anchored] = []
-        start, named = 0, frames_by_name(model) if chain.closures else {}
+        self.anchored: list[Anchored] = []
+        frames, self.m = frames_by_name(model) if chain.closures else {}, 0
         for closure in chain.closures:
-            frames = [named[f] for f in closure.frames]
-            i, j = (int(f.parentJoint) for f in frames)
-            sign = self.tree.support[j].astype(float) - self.tree.support[i].astype(float)
-            self.anchored.append(
-                _Anchored(
-                    len(self.anchored),
-                    closure,
-                    (i, j),
-                    (np.array(frames[0].placement.rotation), np.array(frames[1].placement.rotation)),
-                    (np.array(frames[0].placement.translation), np.array(frames[1].placement.translation)),
-                    sign,
-                    np.flatnonzero(sign),
-                    slice(start, start + closure.kind.rows),
-                )
-            )
-            start += closure.kind.rows
-        self.m = start
-        self.row_scale = np.concatenate(
-            [np.r_[np.full(3, 1.0 / self.length), np.ones(c.kind.rows - 3)] for c in chain.closures] or [np.zeros(0)]
-        )
+            self.anchored.append(closure.anchor(model, frames, self.tree.support, self.m))
+            self.m = self.anchored[-1].rows.stop
         self.column_scale = np.array([1.0 if self.tree.is_angle(k) else self.length for k in range(self.tree.nv)])
+        scales = [c.row_scale(self.length, self.column_scale) for c in self.anchored]
+        self.row_scale = np.concatenate(scales or [np.zeros(0)])
         self._groups = [self._group(members) for members in self._members()]
         self.reduce = np.zeros((sum(g.reduce.shape[0] for g in self._groups), self.m))
         done = 0
@@ -151,7 +66,7 @@ class Loops:
         return len(self._groups)
 
     @property
-    def independent(self) -> list[_Group]:
+    def independent(self) -> list[Group]:
         """The groups of closures that share no passive joint."""
         return self._groups
 
@@ -172,91 +87,62 @@ class Loops:
         for column, k in enumerate(self.actuated):
             self.tree.set_coordinate(q, int(k), np.broadcast_to(x[..., column], q.shape[:1]))
 
-    def pairs(self, poses: Poses) -> list[FramePair]:
-        """Return the world poses of the frames of every closure."""
-        out = []
-        for c in self.anchored:
-            (i, j), (Ri, Rj), (pi, pj) = c.joints, c.R, c.p
-            out.append(
-                FramePair(
-                    np.matmul(poses.R[i], Ri),
-                    poses.p[i] + np.matmul(poses.R[i], pi),
-                    np.matmul(poses.R[j], Rj),
-                    poses.p[j] + np.matmul(poses.R[j], pj),
-                )
-            )
-        return out
+    def pairs(self, poses: Poses) -> list[Any]:
+        """Return what every closure sees of the configurations: the world poses of its frames, or its coordinates."""
+        return [c.look(poses) for c in self.anchored]
 
-    def residual(self, pairs: list[FramePair]) -> Array:
+    def residual(self, pairs: list[Any]) -> Array:
         """Return all closure rows (n, m) [m, rad]; the chain has closures."""
-        return np.concatenate([rows.residual(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
+        return np.concatenate([c.residual(x) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
 
-    def jacobian(self, poses: Poses, pairs: list[FramePair]) -> Array:
+    def jacobian(self, poses: Poses, pairs: list[Any]) -> Array:
         """Return the closure Jacobian J (n, m, nv): residual rate = J v."""
-        J = np.zeros((poses.S.shape[0], self.m, self.tree.nv))
-        for g, block in zip(self._groups, self.blocks(poses, pairs), strict=True):
+        return self.joined(self.blocks(poses, pairs), poses.S.shape[0])
+
+    def joined(self, blocks: list[Array], n: int) -> Array:
+        """Return the closure Jacobian (n, m, nv) from its blocks."""
+        J = np.zeros((n, self.m, self.tree.nv))
+        for g, block in zip(self._groups, blocks, strict=True):
             J[:, g.rows[:, None], g.columns] = block
         return J
 
-    def blocks(self, poses: Poses, pairs: list[FramePair]) -> list[Array]:
+    def blocks(self, poses: Poses, pairs: list[Any]) -> list[Array]:
         """Return the same per independent group of closures, without the zeros."""
-        out = []
-        for g in self._groups:
-            block = np.zeros((poses.S.shape[0], g.rows.size, g.columns.size))
-            start = 0
-            for c in (self.anchored[k] for k in g.members):
-                m = c.closure.kind.rows
-                block[:, start : start + m, np.searchsorted(g.columns, c.moved)] = _rows(c, poses, pairs)
-                start += m
-            out.append(block)
-        return out
+        return [self._block(g.members, g.columns, poses, pairs) for g in self._groups]
 
-    def drift(self, pairs: list[FramePair], rates: Rates) -> Array:
+    def _block(self, members: tuple[int, ...], columns: npt.NDArray[np.intp], poses: Poses, pairs: list[Any]) -> Array:
+        """Return the rows of some closures in some columns (n, rows, columns)."""
+        closures = [self.anchored[k] for k in members]
+        sizes = [c.rows.stop - c.rows.start for c in closures]
+        block, start = np.zeros((poses.S.shape[0], sum(sizes), columns.size)), 0
+        for k, c, size in zip(members, closures, sizes, strict=True):
+            block[:, start : start + size, np.searchsorted(columns, c.columns)] = c.jacobian(pairs[k], poses)
+            start += size
+        return block
+
+    def drift(self, pairs: list[Any], rates: Rates) -> Array:
         """Return the second rate of the residual at zero joint accelerations (n, m)."""
-        return np.concatenate(
-            [
-                rows.drift(c.closure, x, *(rates.V[j] for j in c.joints), *(rates.A[j] for j in c.joints))
-                for c, x in zip(self.anchored, pairs, strict=True)
-            ],
-            axis=1,
-        )
+        return np.concatenate([c.drift(x, rates) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
 
-    def opposed(self, pairs: list[FramePair]) -> npt.NDArray[np.bool_]:
+    def opposed(self, pairs: list[Any]) -> npt.NDArray[np.bool_]:
         """Return where some hinge closes with its axes against each other (n,)."""
-        flags = [rows.opposed(c.closure, x) for c, x in zip(self.anchored, pairs, strict=True)]
+        flags = [c.opposed(x) for c, x in zip(self.anchored, pairs, strict=True)]
         return np.asarray(np.any(flags, axis=0))
 
-    def passive_map(self, blocks: list[Array]) -> PassiveMap:
-        """Invert the passive columns of the Jacobian's blocks. Singular samples get sigma = 0 and X = nan."""
-        n = blocks[0].shape[0] if blocks else 1
-        X, tall, sigma, sign = [], [], np.full(n, 1.0), np.ones((n, len(self._groups)))
-        for k, (g, J) in enumerate(zip(self._groups, blocks, strict=True)):
-            Jp = np.matmul(g.reduce, J[:, :, g.passive_columns]) * g.scale
-            if g.is_square:
-                inverted, determinant = inverse(Jp)
-                sign[:, k] = np.sign(determinant)
-                with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                    smallest = 1.0 / np.sqrt(np.einsum("nij,nij->n", inverted, inverted))
-            else:
-                inverted, smallest = _pseudo_inverse(Jp)
-                tall.append(Jp)
-            X.append(g.scale[:, None] * inverted)
-            if g.passive.size:
-                smallest = np.where(np.isfinite(smallest), smallest, 0.0)
-                sigma = smallest if len(self._groups) == 1 else np.minimum(sigma, smallest)
-        return PassiveMap(self._groups, X, sigma, sign, tall, (self.passive.size, self.actuated.size))
+    def passive_map(self, blocks: list[Array], n: int) -> PassiveMap:
+        """Invert the passive columns of the Jacobian's blocks, see `passive.passive_map`."""
+        return passive_map(self._groups, blocks, n, (self.passive.size, self.actuated.size))
 
-    def rank(self, J: Array, *, tolerance: float = RANK_TOLERANCE) -> int:
-        """Return the rank of one closure Jacobian (m, nv), scaled so that lengths and units do not matter."""
-        s = self.singular_values(J)
-        return int(np.sum(s > tolerance * max(1.0, s[0]))) if s.size else 0
+    def scaled(self, J: Array, rows: _Index = slice(None), columns: _Index = slice(None)) -> Array:
+        """Return closure Jacobians (..., m, nv), or these rows and columns of them, in one unit: lengths do not matter.
 
-    def singular_values(self, J: Array) -> Array:
-        """Return the singular values of the scaled closure Jacobian, descending."""
-        if 0 in J.shape:
-            return np.zeros(0)
-        scaled = self.row_scale[:, None] * J * self.column_scale
-        return np.asarray(np.linalg.svd(scaled, compute_uv=False) if J.size < _WHOLE else block_svd(scaled)[1])
+        Velocities of angles stay as they are, those of slides and the rates of gaps are in the chain's length.
+        """
+        return np.asarray(self.row_scale[rows, None] * J * self.column_scale[columns])
+
+    def rank(self, J: Array) -> int:
+        """Return the rank of one closure Jacobian (m, nv)."""
+        return int(ranks_of(singular_values(self.scaled(J))))
 
     def worst(self, residual: Array) -> tuple[str, float]:
         """Return the closure that one residual (m,) leaves open the most, and by how much."""
@@ -279,8 +165,8 @@ class Loops:
         """Gather closures that share a passive joint."""
         groups: list[tuple[set[int], list[int]]] = []
         passive = set(self.passive.tolist())
-        for c in self.anchored:
-            columns, members = set(c.moved.tolist()) & passive, [c.index]
+        for k, c in enumerate(self.anchored):
+            columns, members = set(c.columns.tolist()) & passive, [k]
             apart = []
             for other_columns, other_members in groups:
                 if columns & other_columns:
@@ -290,13 +176,13 @@ class Loops:
             groups = [*apart, (columns, members)]
         return sorted(tuple(sorted(members)) for _, members in groups)
 
-    def _group(self, members: tuple[int, ...]) -> _Group:
+    def _group(self, members: tuple[int, ...]) -> Group:
         closures = [self.anchored[k] for k in members]
         rows_ = np.concatenate([np.arange(c.rows.start, c.rows.stop) for c in closures])
-        columns = np.unique(np.concatenate([c.moved for c in closures]))
+        columns = np.unique(np.concatenate([c.columns for c in closures]))
         passive = np.flatnonzero(np.isin(self.passive, columns))
         actuated = np.flatnonzero(np.isin(self.actuated, columns))
-        return _Group(
+        return Group(
             members=members,
             rows=rows_,
             columns=columns,
@@ -304,29 +190,24 @@ class Loops:
             passive_columns=np.searchsorted(columns, self.passive[passive]),
             actuated=actuated,
             actuated_columns=np.searchsorted(columns, self.actuated[actuated]),
-            reduce=self._independent_rows(closures, rows_, columns),
+            reduce=self._independent_rows(members, rows_, columns),
             scale=self.column_scale[self.passive[passive]],
         )
 
     def _independent_rows(
-        self, closures: list[_Anchored], rows_: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
+        self, members: tuple[int, ...], rows_: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
     ) -> Array:
         """Find the row combinations of some closures that are independent at generic configurations."""
         poses, pairs = self._generic
-        J = np.zeros((_GENERIC_SAMPLES, rows_.size, columns.size))
-        start = 0
-        for c in closures:
-            m = c.closure.kind.rows
-            J[:, start : start + m, np.searchsorted(columns, c.moved)] = _rows(c, poses, pairs)
-            start += m
+        J = self._block(members, columns, poses, pairs)
         scale = self.row_scale[rows_]
-        wide = np.concatenate(list(J * scale[:, None] * self.column_scale[columns]), axis=1)
+        wide = np.concatenate(list(self.scaled(J, rows_, columns)), axis=1)
         U, s, _ = np.linalg.svd(wide, full_matrices=False)
-        r = int(np.sum(s > RANK_TOLERANCE * max(s[0], 1e-300)))
+        r = int(ranks_of(s))
         return np.diag(scale) if r == rows_.size else np.asarray(U[:, :r].T * scale)
 
     @cached_property
-    def _generic(self) -> tuple[Poses, list[FramePair]]:
+    def _generic(self) -> tuple[Poses, list[Any]]:
         rng = np.random.default_rng(7)
         tangent = rng.uniform(-np.pi, np.pi, (_GENERIC_SAMPLES, self.tree.nv)) * self.column_scale
         q = self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent)
@@ -338,11 +219,6 @@ class Loops:
 def loops_of(chain: ClosedChain) -> Loops:
     """Return the prepared closures of a chain, made once."""
     return Loops(chain)
-
-
-def _rows(c: _Anchored, poses: Poses, pairs: list[FramePair]) -> Array:
-    """Return the Jacobian of one closure in the columns that move it (n, rows, moved)."""
-    return np.asarray(np.matmul(rows.selector(c.closure, pairs[c.index]), poses.S[:, :, c.moved] * c.sign[c.moved]))
 
 
 def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
@@ -361,53 +237,3 @@ def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
         closure=name,
         residual=size,
     )
-
-
-def same_side(before: list[Array], after: list[Array]) -> npt.NDArray[np.bool_]:
-    """Tell whether no singularity lies between tall matrices (..., r, k): square ones show it in their determinant.
-
-    A column combination that passes through zero turns round, which makes det(A^T B) negative.
-    """
-    sides = [np.linalg.det(np.matmul(np.swapaxes(A, -1, -2), B)) > 0.0 for A, B in zip(before, after, strict=True)]
-    return np.asarray(np.all(sides, axis=0))
-
-
-def _pseudo_inverse(M: Array) -> tuple[Array, Array]:
-    """Return the pseudo-inverses of a batch of tall matrices and their smallest singular values."""
-    U, s, Vt = np.linalg.svd(M, full_matrices=False)
-    smallest = s[:, -1] if M.shape[1] >= M.shape[2] > 0 else np.zeros(M.shape[0])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        X = np.matmul(np.swapaxes(Vt, 1, 2) / s[:, None, :], np.swapaxes(U, 1, 2))
-    return X, smallest
-
-
-def inverse(M: Array) -> tuple[Array, Array]:
-    """Invert a batch of square matrices; singular ones become nan. Also return the determinants."""
-    if M.shape[-1] == 2:
-        return _inverse_of_two(M)
-    return _inverse(M), np.asarray(np.linalg.det(M))
-
-
-def _inverse_of_two(M: Array) -> tuple[Array, Array]:
-    """The usual case of one planar loop in closed form: by the cofactors, far cheaper than a factorisation."""
-    det = M[:, 0, 0] * M[:, 1, 1] - M[:, 0, 1] * M[:, 1, 0]
-    with np.errstate(divide="ignore"):
-        scale = np.where(det == 0.0, np.nan, 1.0 / det)
-    X = np.empty_like(M)
-    X[:, 0, 0], X[:, 1, 1] = M[:, 1, 1] * scale, M[:, 0, 0] * scale
-    X[:, 0, 1], X[:, 1, 0] = -M[:, 0, 1] * scale, -M[:, 1, 0] * scale
-    return X, det
-
-
-def _inverse(M: Array) -> Array:
-    """Invert a batch of square matrices by factorisation; singular ones become nan."""
-    try:
-        return np.asarray(np.linalg.inv(M))
-    except np.linalg.LinAlgError:
-        out = np.full_like(M, np.nan)
-        for i, Mi in enumerate(M):
-            try:
-                out[i] = np.linalg.inv(Mi)
-            except np.linalg.LinAlgError:
-                continue
-        return out

@@ -15,44 +15,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures.closure import FramePair
 from fivebar_pin.errors import SingularityError
-from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of, open_message
+from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.per_chain import once_per_chain
-from fivebar_pin.mechanism.tree import Poses
+from fivebar_pin.mechanism.rank import SINGULAR
 
-__all__ = ["ROUND_OFF", "Chart", "Manifold", "Point", "manifold_of"]
+__all__ = ["ROUND_OFF", "Chart", "Manifold", "manifold_of"]
 
 
 ROUND_OFF = 2e-15  # scaled closure residual that Newton's method is asked for [-]
+_SETTLED = 1e-12  # scaled residual below which Newton steps that do not help are round-off [-]
+_LOST = 1e3  # scaled residual, or distance in the chart, beyond which Newton's method is given up [-]
 _PROBES = 8
 _PROBE_STEP = 0.05  # how far the neighbours lie at which the rank is compared [rad, or chain lengths]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Point:
-    """A batch of configurations with the decomposed closure Jacobian.
-
-    Attributes:
-        q: configurations (n, nq).
-        poses, pairs: of the joints and of the closure frames.
-        residual: all closure rows (n, m) [m, rad].
-        reduced: the scaled independent combinations of them (n, r).
-        U, s, Vt: singular value decomposition of the reduced, scaled Jacobian: (n, r, r), (n, r), (n, nv, nv).
-    """
-
-    q: Array
-    poses: Poses
-    pairs: list[FramePair]
-    residual: Array
-    reduced: Array
-    U: Array
-    s: Array
-    Vt: Array
+_PROBE_STEPS = 60  # Newton steps to a neighbour
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,35 +66,26 @@ class Manifold:
         self._curved = any(j.nv > 1 for j in list(chain.model.joints)[1:])
         self._rank: int | None = None
 
-    def at(self, q: Array) -> Point:
+    def at(self, q: Array) -> Configurations:
         """Evaluate the closures at q (n, nq)."""
-        loops, n = self.loops, q.shape[0]
-        poses = loops.tree.poses(q)
-        if not loops.m:
-            V = np.broadcast_to(np.eye(loops.tree.nv), (n, loops.tree.nv, loops.tree.nv))
-            return Point(q, poses, [], np.zeros((n, 0)), np.zeros((n, 0)), np.zeros((n, 0, 0)), np.zeros((n, 0)), V)
-        pairs = loops.pairs(poses)
-        residual = loops.residual(pairs)
-        J = np.matmul(loops.reduce, loops.jacobian(poses, pairs)) * self.scale
-        U, s, Vt = np.linalg.svd(J, full_matrices=True)
-        return Point(q, poses, pairs, residual, residual @ loops.reduce.T, U, s, Vt)
+        return Configurations(self.loops, q)
 
-    def rank_of(self, point: Point) -> int:
+    def rank_of(self, point: Configurations) -> int:
         """Return the rank to work with at closed configurations.
 
         Raises:
             SingularityError: some of them are bifurcations: the rank there is less than at their neighbours.
         """
-        if not self.loops.r or not point.s.size:
+        if not self.loops.r or not point.independent.s.size:
             return self.loops.r
-        ranks = np.sum(point.s > RANK_TOLERANCE * np.maximum(1.0, point.s[:, :1]), axis=1)
+        ranks = point.independent.ranks
         if self._rank is None and int(ranks.min()) == self.loops.r:
             self._rank = self.loops.r
         if self._rank is None:
             self._rank = max(int(ranks.max()), self._rank_nearby(point.q[int(np.argmin(ranks))]))
         worst = int(np.argmin(ranks))
         if ranks[worst] < self._rank:
-            sigma = float(point.s[worst, self._rank - 1])
+            sigma = float(point.independent.smallest(self._rank)[worst])
             raise SingularityError(
                 f"configuration {worst} is a bifurcation of the mechanism: the closures have rank {ranks[worst]} there "
                 f"and {self._rank} around it, so its motion is not determined (smallest scaled singular value "
@@ -121,29 +95,26 @@ class Manifold:
             )
         return self._rank
 
-    def project(self, q: Array, tolerance: float, *, iterations: int = 50) -> Point:
+    def project(self, q: Array, tolerance: float, *, iterations: int = 50) -> Configurations:
         """Return the closed configuration near q (nq,), by Gauss-Newton steps of least length.
 
         Raises:
             AssemblyError: none was reached.
         """
-        loops = self.loops
-        point = self.at(np.array(q[None]))
-        for _ in range(iterations):
-            if np.abs(point.reduced).max(initial=0.0) <= ROUND_OFF:
-                break
-            before = np.abs(point.reduced).max()
-            trial = self.at(loops.tree.integrate(point.q, (self._least(point) * self.scale)[None]))
-            if np.abs(trial.reduced).max() >= before and before < 1e-12:
-                break
-            point = trial
-        if np.abs(point.residual).max(initial=0.0) > tolerance * max(1.0, loops.length):
-            raise open_message(loops, point.residual[0], "near the given configuration")
+        point = self._nearest(q, iterations)
+        if not closed_enough(self.loops, point.gap, tolerance)[0]:
+            raise open_message(self.loops, point.residual[0], "near the given configuration")
         return point
 
-    def chart_at(self, point: Point, rank: int) -> Chart:
+    def _nearest(self, q: Array, iterations: int) -> Configurations:
+        """Return where steps of least length lead from q (nq,), closed or not."""
+        rule = _LeastSteps()
+        q = iterate(self.loops, q[None], rule, most=iterations + 1)  # the last one only looks
+        return rule.reached
+
+    def chart_at(self, point: Configurations, rank: int) -> Chart:
         """Return independent coordinates around the first configuration of a point."""
-        return Chart(np.array(point.q[0]), np.array(point.Vt[0, rank:].T))
+        return Chart(np.array(point.q[0]), np.array(point.independent.tangent(rank)[0]))
 
     def coordinates(self, chart: Chart, q: Array) -> Array:
         """Return the independent coordinates (f,) of q (nq,)."""
@@ -157,54 +128,78 @@ class Manifold:
         D = pin.dDifference(self._model, chart.q, q, pin.ARG1)
         return np.asarray(chart.B.T @ (D / self.scale[:, None] * self.scale))
 
-    def solve(self, chart: Chart, xi: Array, guess: Array, rank: int, *, iterations: int = 12) -> Point | None:
+    def solve(self, chart: Chart, xi: Array, guess: Array, rank: int, *, iterations: int = 12) -> Configurations | None:
         """Return the closed configuration with independent coordinates xi (f,), from a guess (nq,); None if none."""
-        tree, q = self.loops.tree, guess[None]
-        last = np.inf
-        for _ in range(iterations):
-            point = self.at(q)
-            off = xi - self.coordinates(chart, q[0])
-            size = max(float(np.abs(point.reduced).max(initial=0.0)), float(np.abs(off).max(initial=0.0)))
-            if size <= ROUND_OFF * (1.0 + float(np.abs(xi).max(initial=0.0))) or (size < 1e-12 and size >= 0.5 * last):
-                return point
-            if not size < 1e3:
-                return None
-            last = size
-            Vr = point.Vt[0, :rank]
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                inward = -(point.U[0, :, :rank].T @ point.reduced[0]) / point.s[0, :rank]
-            A = np.concatenate([Vr, self.slope(chart, q[0])])
-            try:
-                step = np.linalg.solve(A, np.concatenate([inward, off]))
-            except np.linalg.LinAlgError:
-                return None
-            if not np.all(np.isfinite(step)):
-                return None
-            q = tree.integrate(q, (step * self.scale)[None])
-        return None
-
-    def _least(self, point: Point) -> Array:
-        """Return the step of least length towards closure, scaled (nv,); directions of tiny slope are left out."""
-        keep = point.s[0] > 1e-7
-        along = np.where(keep, point.U[0, :, : keep.size].T @ point.reduced[0], 0.0) / np.where(keep, point.s[0], 1.0)
-        step = -(point.Vt[0, : keep.size].T @ along)
-        return np.asarray(step * min(1.0, 0.5 / max(float(np.abs(step).max(initial=0.0)), 1e-300)))
+        rule = _ChartSteps(self, chart, xi, rank)
+        iterate(self.loops, guess[None], rule, most=iterations)
+        return rule.reached
 
     def _rank_nearby(self, q: Array) -> int:
         """Return the largest rank met at closed configurations around q (nq,)."""
         rng = np.random.default_rng(11)
-        here = self.at(q[None])
-        tangent = here.Vt[0, int(np.sum(here.s[0] > RANK_TOLERANCE)) :]
+        here = self.at(q[None]).independent
+        tangent = here.tangent(here.rank)[0].T
         best = 0
         for _ in range(_PROBES):
             step = rng.normal(size=tangent.shape[0]) @ tangent
-            away = _PROBE_STEP * step / max(float(np.abs(step).max(initial=0.0)), 1e-300)
-            near = self.at(self.loops.tree.integrate(q[None], (away * self.scale)[None]))
-            for _ in range(60):
-                near = self.at(self.loops.tree.integrate(near.q, (self._least(near) * self.scale)[None]))
-            if np.abs(near.reduced).max(initial=0.0) < 1e-12:
-                best = max(best, int(np.sum(near.s[0] > 1e-7)))
+            away = _PROBE_STEP * step / max(float(np.abs(step).max(initial=0.0)), TINY)
+            near = self._nearest(self.loops.tree.integrate(q[None], (away * self.scale)[None])[0], _PROBE_STEPS)
+            if np.abs(near.reduced).max(initial=0.0) < _SETTLED:
+                best = max(best, int(np.sum(near.independent.s[0] > SINGULAR)))
         return best
+
+
+class _LeastSteps:
+    """Steps of least length in all coordinates, of one sample; directions of tiny slope are left out."""
+
+    reached: Configurations
+
+    def __init__(self) -> None:
+        self._open = np.inf
+
+    def __call__(self, here: Configurations, which: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.bool_]]:
+        size = float(np.abs(here.reduced).max(initial=0.0))
+        if size >= self._open and self._open < _SETTLED:  # round-off: the last one was no worse
+            return self.reached.q, np.zeros(1, dtype=np.bool_)
+        self.reached, self._open = here, size
+        if size <= ROUND_OFF:
+            return here.q, np.zeros(1, dtype=np.bool_)
+        J = here.independent
+        step = -J.solve(here.reduced, int(np.sum(J.s[0] > SINGULAR)))
+        step *= min(1.0, STEP / max(float(np.abs(step).max(initial=0.0)), TINY))
+        return here.loops.tree.integrate(here.q, step * here.loops.column_scale), np.ones(1, dtype=np.bool_)
+
+
+class _ChartSteps:
+    """Newton steps of one sample towards closed loops and given independent coordinates at once."""
+
+    def __init__(self, manifold: Manifold, chart: Chart, xi: Array, rank: int) -> None:
+        self._manifold, self._chart, self._xi, self._rank = manifold, chart, xi, rank
+        self._enough = ROUND_OFF * (1.0 + float(np.abs(xi).max(initial=0.0)))
+        self._last = np.inf
+        self.reached: Configurations | None = None
+
+    def __call__(self, here: Configurations, which: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.bool_]]:
+        off = self._xi - self._manifold.coordinates(self._chart, here.q[0])
+        size = max(float(np.abs(here.reduced).max(initial=0.0)), float(np.abs(off).max(initial=0.0)))
+        if size <= self._enough or (size < _SETTLED and size >= 0.5 * self._last):
+            self.reached = here
+        step = None if self.reached is not None or not size < _LOST else self._step(here, off)
+        self._last = size
+        if step is None:
+            return here.q, np.zeros(1, dtype=np.bool_)
+        return here.loops.tree.integrate(here.q, (step * self._manifold.scale)[None]), np.ones(1, dtype=np.bool_)
+
+    def _step(self, here: Configurations, off: Array) -> Array | None:
+        """Return the scaled step (nv,), None where chart and closures do not determine one."""
+        J = here.independent
+        inward = -J.components(here.reduced, self._rank)[0]
+        A = np.concatenate([J.Vt[0, : self._rank], self._manifold.slope(self._chart, here.q[0])])
+        try:
+            step = np.linalg.solve(A, np.concatenate([inward, off]))
+        except np.linalg.LinAlgError:
+            return None
+        return np.asarray(step) if np.all(np.isfinite(step)) else None
 
 
 @once_per_chain

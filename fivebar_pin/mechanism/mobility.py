@@ -1,25 +1,25 @@
 """Closed configurations of a chain whichever joints are driven, and what its closures do there.
 
-Every decision about rank is made by `Loops.rank`; here its consequences are given names.
+Every decision about rank is made in `mechanism.rank`; here its consequences are given names.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, block_svd
+from fivebar_pin._arrays import TINY, Array, block_svd
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate, search
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.newton import closed_enough, residual_of, search
+from fivebar_pin.mechanism.rank import ranks_of, singular_values, truncated_inverse
 
 __all__ = [
-    "Site",
     "close",
     "determining_sets",
     "first_closed",
@@ -32,7 +32,8 @@ __all__ = [
 ]
 
 
-_TRUNCATE = 1e-6  # singular values below this part of the largest are left out of a Newton step [-]
+_NEWTON = 8  # steps of Newton's method in all coordinates
+_NOTHING = 1e-8  # weight of a row in a combination that is round-off, pivots being one [-]
 _STARTS = 48  # random starts when no configuration is given
 _WALKERS, _STRIDES = 8, 2  # samples and steps of the walk that finds generic configurations
 _ENTRIES = 400_000  # numbers in the Jacobians of all of them at a time
@@ -40,38 +41,14 @@ _STRIDE = 0.4  # length of its steps [rad, or chain lengths]
 _MANY = 2000  # combinations of joints beyond which only a good one is looked for
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Site:
-    """The closures at one configuration.
-
-    Attributes:
-        q: configuration (nq,).
-        J: closure Jacobian (m, nv).
-        rank: its rank.
-        free: orthonormal basis of the scaled velocities it allows (nv, nv - rank).
-    """
-
-    q: Array
-    J: Array
-    rank: int
-    free: Array
-
-
-def site_at(loops: Loops, q: Array) -> Site:
-    """Evaluate the closures at q (nq,)."""
-    nv = loops.tree.nv
-    if not loops.m:
-        return Site(q, np.zeros((0, nv)), 0, np.eye(nv))
-    poses = loops.tree.poses(q[None])
-    J = loops.jacobian(poses, loops.pairs(poses))[0]
-    rank = loops.rank(J)
-    _, _, Vt = block_svd(loops.row_scale[:, None] * J * loops.column_scale)
-    return Site(q, J, rank, Vt[rank:].T)
+def site_at(loops: Loops, q: Array) -> Configurations:
+    """Return one configuration q (nq,)."""
+    return Configurations(loops, q[None])
 
 
 def gap(loops: Loops, q: Array) -> Array:
     """Return the largest closure residual at configurations q (n, nq) -> (n,) [m or rad]."""
-    return np.abs(residual_of(loops, q)).max(axis=1, initial=0.0) if loops.m else np.zeros(q.shape[0])
+    return Configurations(loops, q).gap
 
 
 def close(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]:
@@ -87,20 +64,27 @@ def close(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]
     q = np.array(q)
     if not good.all():
         q[~good] = search(loops, q[~good])
-    for _ in range(8):
-        poses = loops.tree.poses(q)
-        pairs = loops.pairs(poses)
-        residual = loops.residual(pairs) * loops.row_scale
-        step = np.zeros((q.shape[0], loops.tree.nv))
-        for g, block in zip(loops.independent, loops.blocks(poses, pairs), strict=True):
-            scaled = loops.row_scale[g.rows, None] * block * loops.column_scale[g.columns]
-            inverse = np.linalg.pinv(scaled, rcond=_TRUNCATE)
+    q = iterate(loops, q, _AllCoordinates(good), most=_NEWTON)
+    found = Configurations(loops, q)
+    return q, np.where(loops.opposed(found.pairs), np.inf, found.gap)
+
+
+class _AllCoordinates:
+    """Steps of least length in all coordinates, group by group, of the samples that do not close yet."""
+
+    def __init__(self, good: npt.NDArray[np.bool_]) -> None:
+        self._good = good
+
+    def __call__(self, here: Configurations, which: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.bool_]]:
+        loops = here.loops
+        residual = here.residual * loops.row_scale
+        step = np.zeros((which.size, loops.tree.nv))
+        for g, block in zip(loops.independent, here.blocks, strict=True):
+            inverse = truncated_inverse(loops.scaled(block, g.rows, g.columns))
             step[:, g.columns] = -np.matmul(inverse, residual[:, g.rows, None])[..., 0]
-        step[good] = 0.0
-        q = loops.tree.integrate(q, np.clip(step, -0.5, 0.5) * loops.column_scale)
-    residual = gap(loops, q)
-    residual[loops.opposed(loops.pairs(loops.tree.poses(q)))] = np.inf
-    return q, residual
+        step[self._good[which]] = 0.0
+        q = loops.tree.integrate(here.q, np.clip(step, -STEP, STEP) * loops.column_scale)
+        return q, np.ones(which.size, dtype=np.bool_)
 
 
 def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array, float]:
@@ -127,23 +111,23 @@ def _affordable(count: int, loops: Loops) -> int:
     return max(1, min(count, _ENTRIES // max(1, loops.m * loops.tree.nv)))
 
 
-def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) -> Site:
+def generic_site(chain: ClosedChain, site: Configurations, seed: int, tolerance: float) -> Configurations:
     """Walk away from a closed configuration along what the closures allow; return the most regular site met there.
 
     The rank of the closures is highest at almost every configuration and drops at singular ones, where branches of
     different character may meet: those that the actuated joints can drive come first.
     """
     loops = loops_of(chain)
-    if not loops.m or not site.free.shape[1]:
+    if not loops.m or not site.free.shape[2]:
         return site
     rng = np.random.default_rng(seed)
     best, score = site, _score(loops, site)
     walkers = _affordable(_WALKERS, loops)
     here = [site] * walkers
     for _ in range(_STRIDES):
-        steps = [s.free @ rng.normal(size=s.free.shape[1]) for s in here]
-        tangent = np.stack([_STRIDE * d / max(float(np.abs(d).max()), 1e-300) for d in steps]) * loops.column_scale
-        start = loops.tree.integrate(np.stack([s.q for s in here]), tangent)
+        steps = [s.free[0] @ rng.normal(size=s.free.shape[2]) for s in here]
+        tangent = np.stack([_STRIDE * d / max(float(np.abs(d).max()), TINY) for d in steps]) * loops.column_scale
+        start = loops.tree.integrate(np.concatenate([s.q for s in here]), tangent)
         q, residual = close(chain, start, tolerance)
         closed = closed_enough(loops, residual, tolerance)
         here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(walkers)]
@@ -154,10 +138,10 @@ def generic_site(chain: ClosedChain, site: Site, seed: int, tolerance: float) ->
     return best
 
 
-def _score(loops: Loops, site: Site) -> tuple[int, int, float]:
+def _score(loops: Loops, site: Configurations) -> tuple[int, int, float]:
     """Return the rank, the rank with the actuated joints held, and the smallest singular value that counts."""
-    s = loops.singular_values(site.J)
-    return site.rank, loops.rank(held(site.J, loops.actuated)), float(s[site.rank - 1]) if site.rank else 0.0
+    s = site.whole.s[0]
+    return site.rank, loops.rank(held(site.J[0], loops.actuated)), float(s[site.rank - 1]) if site.rank else 0.0
 
 
 def held(J: Array, joints: npt.NDArray[np.intp]) -> Array:
@@ -167,7 +151,7 @@ def held(J: Array, joints: npt.NDArray[np.intp]) -> Array:
     return out
 
 
-def redundant_combinations(loops: Loops, site: Site) -> tuple[Array, Array]:
+def redundant_combinations(loops: Loops, site: Configurations) -> tuple[Array, Array]:
     """Return the row combinations that vanish at every configuration, and those that vanish at this site besides.
 
     Each (k, m), over the scaled rows, in echelon form: every row has a one at its own pivot.
@@ -176,8 +160,7 @@ def redundant_combinations(loops: Loops, site: Site) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((0, 0))
     kept = loops.reduce / loops.row_scale  # orthonormal rows
     always = _complement_rows(kept, loops.m - loops.r)
-    U, _, _ = block_svd(loops.row_scale[:, None] * site.J * loops.column_scale)
-    null = U[:, site.rank :].T
+    null = site.whole.left_null(site.rank)[0]
     extra = null.shape[0] - always.shape[0]
     outside = null - null @ always.T @ always
     here = block_svd(outside)[2][:extra] if extra > 0 else np.zeros((0, null.shape[1]))
@@ -204,7 +187,7 @@ def _echelon(rows: Array) -> Array:
             if k != i:
                 out[k] -= out[k, pivot] * out[i]
         done.append(pivot)
-    out[np.abs(out) < 1e-8] = 0.0
+    out[np.abs(out) < _NOTHING] = 0.0
     return out
 
 
@@ -213,11 +196,11 @@ def passive_sigma(loops: Loops, J: Array, actuated: npt.NDArray[np.intp]) -> flo
     passive = np.setdiff1d(np.arange(loops.tree.nv), actuated)
     if not passive.size:
         return 1.0
-    Jp = held(J, actuated)
-    return float(loops.singular_values(Jp)[passive.size - 1]) if loops.rank(Jp) == passive.size else 0.0
+    s = singular_values(loops.scaled(held(J, actuated)))
+    return float(s[passive.size - 1]) if ranks_of(s) == passive.size else 0.0
 
 
-def determining_sets(chain: ClosedChain, site: Site, most: int) -> list[tuple[tuple[str, ...], float]]:
+def determining_sets(chain: ClosedChain, site: Configurations, most: int) -> list[tuple[tuple[str, ...], float]]:
     """List sets of one-degree-of-freedom joints that determine the motion at a site, the best conditioned first."""
     loops, model = loops_of(chain), chain.model
     mobility = chain.nv - site.rank
@@ -228,10 +211,10 @@ def determining_sets(chain: ClosedChain, site: Site, most: int) -> list[tuple[tu
     if math.comb(len(single), mobility) <= _MANY:
         combinations = list(itertools.combinations(single, mobility))
     else:
-        combinations = [_greedy(site.free, columns)]
+        combinations = [_greedy(site.free[0], columns)]
     out = []
     for joints in combinations:
-        sigma = passive_sigma(loops, site.J, np.array([columns[j] for j in joints]))
+        sigma = passive_sigma(loops, site.J[0], np.array([columns[j] for j in joints]))
         if sigma > 0.0:
             out.append((tuple(model.names[j] for j in joints), sigma))
     out.sort(key=lambda item: -round(item[1], 12))

@@ -8,9 +8,9 @@ sample. Spatial quantities are linear-before-angular, in world axes at the world
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,11 +55,13 @@ class Poses:
         R: per joint (n, 3, 3), index 0 is the universe.
         p: per joint (n, 3) [m].
         S: motion subspace of every velocity coordinate, world axes at the world origin (n, 6, nv).
+        q: the configurations (n, nq).
     """
 
     R: list[Array]
     p: list[Array]
     S: Array
+    q: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +82,7 @@ class Tree:
     def __init__(self, model: pin.Model) -> None:
         self.nq, self.nv, self.njoints = int(model.nq), int(model.nv), int(model.njoints)
         self._model = model
+        self._workspace = threading.local()
         self.joints: list[_Joint | None] = [None, *(_read_joint(model, j) for j in range(1, self.njoints))]
         self._owner = [
             joint for joint in self.joints[1:] if joint is not None for _ in range(joint.v.stop - joint.v.start)
@@ -104,11 +107,14 @@ class Tree:
         for joint in self.joints[1:]:
             assert joint is not None
             _advance(joint, q, R, p, S)
-        return Poses(R, p, S)
+        return Poses(R, p, S, q)
 
-    @cached_property
+    @property
     def _data(self) -> Any:
-        return self._model.createData()
+        """Pinocchio's workspace, of each thread its own: one that is shared gives wrong numbers."""
+        if not hasattr(self._workspace, "data"):
+            self._workspace.data = self._model.createData()
+        return self._workspace.data
 
     def _poses_of_few(self, q: Array) -> Poses:
         """The same through Pinocchio, which is faster for a handful of samples."""
@@ -120,7 +126,7 @@ class Tree:
             S[i] = pin.computeJointJacobians(self._model, data, q[i]).reshape(6, self.nv)
             for j, M in enumerate(data.oMi):
                 R[j][i], p[j][i] = M.rotation, M.translation
-        return Poses(R, p, S)
+        return Poses(R, p, S, q)
 
     def coordinate(self, q: Array, k: int) -> Array:
         """Return the coordinate that belongs to velocity index k of a one-degree-of-freedom joint.  (n, nq) -> (n,)."""

@@ -11,6 +11,8 @@ from fivebar_pin.motion.motion import Motion
 
 __all__ = ["constant", "cycloidal", "harmonic", "polynomial", "spline"]
 
+_SAME = 1e-12  # difference of the first and last knot of a cycle that is round-off [of the values, at least one]
+
 
 def constant(t: npt.ArrayLike, value: float) -> Motion:
     """Hold one coordinate still."""
@@ -93,7 +95,7 @@ def spline(t: npt.ArrayLike, knots: npt.ArrayLike, values: npt.ArrayLike, *, per
         raise InvalidInputError("knots", x.tolist(), "must be at least six, strictly increasing")
     if time.size and (time.min() < x[0] or time.max() > x[-1]):
         raise InvalidInputError("t", [float(time.min()), float(time.max())], f"must lie within [{x[0]}, {x[-1]}]")
-    if periodic and not np.allclose(y[0], y[-1], rtol=0.0, atol=1e-12 * (1.0 + np.abs(y).max())):
+    if periodic and not np.allclose(y[0], y[-1], rtol=0.0, atol=_SAME * (1.0 + np.abs(y).max())):
         raise InvalidInputError("values[-1]", y[-1].tolist(), f"must equal values[0] = {y[0].tolist()} when periodic")
     if periodic:
         y = np.concatenate([y[:-1], y[:1]])

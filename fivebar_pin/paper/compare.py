@@ -151,7 +151,7 @@ def _pinocchio(chain: ClosedChain, q: Array) -> tuple[Array, Array, float]:
     """Return T N (n, 12, 2), N^T M N (n, 2, 2) and the largest |J N|, all from Pinocchio."""
     model = chain.model
     data = model.createData()
-    first, second = (find_frame(model, f) for f in chain.closures[0].frames)
+    first, second = (find_frame(model, f) for f in chain.closures[0].ends)
     cm = pin.PointAnchorConstraintModel(model, first.parentJoint, first.placement, second.parentJoint, second.placement)
     cdata = cm.createData()
     driven, passive = chain.actuated_index, chain.passive_index

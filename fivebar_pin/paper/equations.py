@@ -12,9 +12,10 @@ import numpy as np
 from fivebar_pin._arrays import Array, Immutable, finite, frozen
 from fivebar_pin.paper.linkage import FiveBar
 
-__all__ = ["EQUATIONS", "Conditions", "conditions"]
+__all__ = ["EQUATIONS", "HOLDS", "Conditions", "conditions"]
 
 EQUATIONS = ("(60)", "(61)", "(62)", "(63)", "(68)", "(69)", "(70)")
+HOLDS = 1e-12  # residual of an equation that holds: round-off of numbers of size one [-]
 
 # Residual = ROWS @ (mu rho cos alpha, mu rho sin alpha, mu) - RIGHT, left side minus right side as the paper has them.
 ROWS = np.zeros((7, 12))
@@ -50,7 +51,7 @@ class Conditions(Immutable):
         """Largest residual [-]."""
         return float(np.abs(self.residuals).max())
 
-    def hold(self, *, tolerance: float = 1e-12) -> bool:
+    def hold(self, *, tolerance: float = HOLDS) -> bool:
         """Whether every equation holds within the tolerance [-] and every inequality strictly."""
         return self.worst <= tolerance and bool(np.all(self.ratios > 0.0))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from fivebar_pin._arrays import Immutable
 from fivebar_pin.paper import evidence as ev
+from fivebar_pin.paper.equations import HOLDS
 from fivebar_pin.paper.solution import Solution
 
 __all__ = ["Erratum", "errata"]
@@ -32,7 +33,7 @@ class Erratum(Immutable):
     measure: str
     printed_error: float
     repaired_error: float
-    tolerance: float = 1e-12
+    tolerance: float = HOLDS
 
 
 def errata() -> tuple[Erratum, ...]:

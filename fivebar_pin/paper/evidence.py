@@ -40,6 +40,8 @@ __all__ = [
     "torque",
 ]
 
+_STEP = 1e-30  # of the complex step: no difference is taken, so that it may be as small as numbers are [rad, rad/s]
+
 Pair = tuple[float, float]
 Angles = npt.NDArray[Any]  # real, or complex for a complex step
 
@@ -74,8 +76,8 @@ def loop_slope(which: str, k: int) -> Callable[[Solution], Pair]:
 
     def evidence(s: Solution) -> Pair:
         x = [s.angles[:, 0], s.angles[:, 3], s.angles[:, index]]
-        step = [angle + (1e-30j if j == k else 0.0) for j, angle in enumerate(x)]
-        exact = function(s.linkage, *step).imag / 1e-30
+        step = [angle + (1j * _STEP if j == k else 0.0) for j, angle in enumerate(x)]
+        exact = function(s.linkage, *step).imag / _STEP
         printed, repaired = (slopes(s.linkage, *x, form=form)[k] for form in ("printed", "repaired"))
         return error(printed, exact), error(repaired, exact)
 
@@ -115,9 +117,9 @@ def ratio_slope(name: str) -> Callable[[Solution], Pair]:
     def evidence(s: Solution) -> Pair:
         x: dict[str, Angles] = {"psi": s.angles[:, 0], "gamma": s.angles[:, 3], "theta": s.angles[:, 1]}
         x |= {"psi'": s.rates[:, 0], "gamma'": s.rates[:, 3]}
-        x[name] = x[name] + 1e-30j
+        x[name] = x[name] + 1j * _STEP
         f = theta_loop(s.linkage, x["psi"], x["gamma"], x["theta"], form="printed")
-        exact = (-(f.psi + f.gamma * x["gamma'"] / x["psi'"]) / f.x).imag / 1e-30
+        exact = (-(f.psi + f.gamma * x["gamma'"] / x["psi'"]) / f.x).imag / _STEP
         rate = (s.accelerations[:, 1] - ratios(s).theta * s.accelerations[:, 0]) / s.rates[:, 0]
         return error(printed_theta_slopes(s)[name], exact), error(ratio_rates(s).theta, rate)
 

@@ -15,13 +15,14 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, checked, frozen, numeric
 from fivebar_pin.chain import ClosedChain, Visual
-from fivebar_pin.closures import Closure, ClosureKind
+from fivebar_pin.closures import Point
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.paper.assembly_mode import AssemblyMode
 from fivebar_pin.paper.positions import CArray, position
 
 __all__ = ["FiveBar"]
 
+_STRONG = 1e6  # effort and velocity limit [N m, rad/s]: none that matters
 _WIDE = 1e4  # joint limit [rad]: the angles may turn many times
 _COLOURS = ((0.16, 0.44, 0.70), (0.90, 0.62, 0.10), (0.34, 0.62, 0.32), (0.76, 0.30, 0.28))
 
@@ -115,7 +116,7 @@ class FiveBar(Immutable):
         theta = _add_link(model, psi, "theta_psi", a1, self._body(2), "link2")
         _add_point(model, theta, "O3_link2", a2, "link2")
         _add_point(model, phi, "O3_link3", a3, "link3")
-        closure = Closure(("O3_link2", "O3_link3"), ClosureKind.POINT, name="O3")
+        closure = Point(("O3_link2", "O3_link3"), name="O3")
         return ClosedChain(model, (closure,), ("psi", "gamma"), name="five_bar", visuals=_visuals(self.lengths))
 
     def configuration(
@@ -157,7 +158,7 @@ def _all_positive(name: str, values: Array, bound: str) -> None:
 
 def _add_link(model: pin.Model, parent: int, joint: str, x: float, body: pin.Inertia, link: str) -> int:
     """Add a hinge about z at x on the parent's x axis, and the body that it carries."""
-    limit, far = np.full(1, 1e6), np.full(1, _WIDE)
+    limit, far = np.full(1, _STRONG), np.full(1, _WIDE)
     placement = pin.SE3(np.eye(3), np.array([x, 0.0, 0.0]))
     index = int(model.addJoint(parent, pin.JointModelRZ(), placement, joint, limit, limit, -far, far))
     model.appendBodyToJoint(index, body, pin.SE3.Identity())

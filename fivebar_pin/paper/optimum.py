@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, number, numeric
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, SolverError
-from fivebar_pin.paper.equations import Conditions, conditions
+from fivebar_pin.paper.equations import HOLDS, Conditions, conditions
 from fivebar_pin.paper.linkage import FiveBar
 from fivebar_pin.paper.polar import Problem, Stationary, alone, climb
 from fivebar_pin.paper.starts import balanced_points, mixtures, only_point
@@ -18,6 +18,11 @@ from fivebar_pin.paper.starts import balanced_points, mixtures, only_point
 __all__ = ["Optimum", "balance_mass_centres", "balance_masses"]
 
 Bounds = tuple[npt.ArrayLike, npt.ArrayLike]
+
+_WRITTEN = 1e-9  # weights written with so many digits add up to one [-]
+_ADDED = 1e-12  # round-off of a sum of masses [of the sum]
+_FLAT = 1e-9  # negative curvature that is round-off [-]
+_SAME = 1e-9  # difference of objectives, over 1 + objective, that counts as none [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -71,7 +76,7 @@ def balance_mass_centres(
     *,
     weights: tuple[float, float] = (0.5, 0.5),
     rho_bounds: Bounds | None = None,
-    tolerance: float = 1e-12,
+    tolerance: float = HOLDS,
 ) -> Optimum:
     """Return the optimum of (77)-(79) in alpha_i and rho_i, the masses being those of the linkage.
 
@@ -108,7 +113,7 @@ def balance_masses(
     total_mass: float | None = None,
     weights: tuple[float, float] = (0.5, 0.5),
     rho_bounds: Bounds | None = None,
-    tolerance: float = 1e-12,
+    tolerance: float = HOLDS,
 ) -> Optimum:
     """Return the optimum of (77) in all twelve variables alpha_i, rho_i, mu_i, under (70) and (71).
 
@@ -130,7 +135,7 @@ def balance_masses(
     low, high = _bounds("mass_bounds", mass_bounds)
     if np.any(low <= 0.0):
         raise InvalidInputError("mass_bounds[0]", low.tolist(), "must be positive, (71) [kg]")
-    if low.sum() > total * (1.0 + 1e-12) or high.sum() < total * (1.0 - 1e-12):
+    if low.sum() > total * (1.0 + _ADDED) or high.sum() < total * (1.0 - _ADDED):
         raise InfeasibleError(
             f"Masses between {low.tolist()} and {high.tolist()} kg add up to between {low.sum():g} and {high.sum():g} "
             f"kg, never to the total mass of {total:g} kg. Change mass_bounds or total_mass."
@@ -152,7 +157,7 @@ def balance_masses(
 
 def _problem(weights: tuple[float, float], rho_bounds: Bounds | None, mu: tuple[Array, Array]) -> Problem:
     w = checked("weights", weights, (2,))
-    if np.any(w <= 0.0) or np.any(w >= 1.0) or abs(w.sum() - 1.0) > 1e-9:
+    if np.any(w <= 0.0) or np.any(w >= 1.0) or abs(w.sum() - 1.0) > _WRITTEN:
         raise InvalidInputError("weights", w.tolist(), "must lie between 0 and 1 and add up to 1, (78)")
     low, high = np.full(12, -np.inf), np.full(12, np.inf)
     if rho_bounds is not None:
@@ -186,7 +191,7 @@ def _best(
     total: float | None = None,
 ) -> Optimum:
     """Return the best of the points that are minima; `total` mass where the masses were free [kg]."""
-    minima = [p for p in points if p.residual <= tolerance and p.curvature >= -1e-9]
+    minima = [p for p in points if p.residual <= tolerance and p.curvature >= -_FLAT]
     if not minima:
         nearest: Stationary = min(points, key=lambda p: p.residual)
         raise SolverError(
@@ -199,14 +204,14 @@ def _best(
     best = minima[0]
     values = [problem.objective(p.x) for p in minima]
     known = min(problem.objective(x) for x in starts)
-    if values[0] > known + 1e-9 * (1.0 + known):
+    if values[0] > known + _SAME * (1.0 + known):
         raise SolverError(
             f"The best minimum found has the objective {values[0]:.6g}, but a balanced linkage with {known:.6g} is "
             "known: the search missed a minimum. Change the bounds or the weights a little.",
             residual=values[0] - known,
-            tolerance=1e-9,
+            tolerance=_SAME,
         )
-    distinct = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > 1e-9 * (1.0 + v)]
+    distinct = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > _SAME * (1.0 + v)]
     alpha, rho, mu = best.x[:4], best.x[4:8], best.x[8:]
     masses = linkage.masses if total is None else total * mu
     balanced = replace(linkage, masses=masses, rho=rho, alpha=alpha)

@@ -11,6 +11,7 @@ from fivebar_pin.paper.linkage import FiveBar
 
 __all__ = ["check_path"]
 
+_MEET = 1e-9  # least distance of O2 and O4 that counts as none [of their largest]
 _SUBSTEPS = 32
 # Quintic Hermite polynomials of (q0, v0 h, a0 h^2, q1, v1 h, a1 h^2), coefficients of s^0 .. s^5.
 _HERMITE = np.array(
@@ -78,7 +79,7 @@ def _follow(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], inte
         h = t[k + 1] - t[k]
         ends = np.stack([x[:, j] * h**order for j in (k, k + 1) for order, x in enumerate(driven)])  # (6, 2)
         d = _gap(linkage, (basis @ ends).T)
-        if np.abs(d).max() >= high or np.abs(d).min() <= low or _distance(d) < 1e-9 * high:
+        if np.abs(d).max() >= high or np.abs(d).min() <= low or _distance(d) < _MEET * high:
             raise SingularityError(
                 f"The motion passes a singularity between sample {k}, t = {t[k]:.6g} s, and sample {k + 1}, "
                 f"t = {t[k + 1]:.6g} s: O2, O3 and O4 come to lie on a line. Change the motion or the lengths.",

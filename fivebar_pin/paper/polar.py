@@ -13,11 +13,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable
+from fivebar_pin._arrays import TINY, Array, Immutable
 from fivebar_pin.paper.equations import RIGHT, ROWS
 
 __all__ = ["Problem", "Stationary", "alone", "climb"]
 
+_FIRST = 1e-13  # change of the objective at which the first solver stops [-]
+_STOP = 1e-16  # step at which Newton has nothing left to do [rad or -]
+_SIGN = 1e-12  # multiplier of the wrong sign that is round-off [-]
+_RANK = 1e-10  # singular value of the conditions that counts as zero [of the largest, at least one]
 _NEAR = 1e-7  # a variable this close to its bound after the first solver is tried as active
 
 
@@ -141,7 +145,7 @@ def climb(problem: Problem, start: Array) -> Stationary:
                 "jac": lambda z: problem.jacobian(whole(z))[:, free],
             },
             method="SLSQP",
-            options={"maxiter": 300, "ftol": 1e-13},
+            options={"maxiter": 300, "ftol": _FIRST},
         )
     return _polish(problem, whole(np.asarray(answer.x)))
 
@@ -158,7 +162,7 @@ def _polish(problem: Problem, x: Array) -> Stationary:
         if outside.max() > 0.0:
             k = int(np.argmax(outside))
             active[k] = True
-        elif wrong.max() > 1e-12:
+        elif wrong.max() > _SIGN:
             k = int(np.argmax(wrong))
             active[k] = False
         else:
@@ -183,8 +187,8 @@ def _newton(problem: Problem, x: Array, active: npt.NDArray[np.bool_]) -> Statio
         right = -np.concatenate([g[moving] + J[:, moving].T @ multipliers, problem.residual(x)])
         step = np.linalg.lstsq(K, right, rcond=None)[0][: moving.size]
         x = x.copy()
-        x[moving] += step * min(1.0, 1.0 / max(float(np.abs(step).max(initial=0.0)), 1e-300))
-        if np.abs(step).max(initial=0.0) <= 1e-16:
+        x[moving] += step * min(1.0, 1.0 / max(float(np.abs(step).max(initial=0.0)), TINY))
+        if np.abs(step).max(initial=0.0) <= _STOP:
             break
     return best
 
@@ -213,7 +217,7 @@ def _curvature(problem: Problem, x: Array, multipliers: Array, active: npt.NDArr
     moving = np.flatnonzero(~active)
     J = problem.jacobian(x)[:, moving]
     _, values, V = np.linalg.svd(J)
-    rank = int(np.sum(values > 1e-10 * max(float(values.max(initial=0.0)), 1.0)))
+    rank = int(np.sum(values > _RANK * max(float(values.max(initial=0.0)), 1.0)))
     Z = V[rank:].T
     if Z.shape[1] == 0:
         return float("inf")

@@ -10,6 +10,8 @@ from fivebar_pin.paper.positions import CArray
 
 __all__ = ["common_points"]
 
+_ON = 1e-13  # violation of a point on a circle, by round-off [of the size of the picture]
+
 
 def common_points(centres: npt.ArrayLike, inner: npt.ArrayLike, outer: npt.ArrayLike) -> tuple[CArray, float]:
     """Return points common to the rings inner_i <= |s - centre_i| <= outer_i, and the least violation otherwise.
@@ -37,7 +39,7 @@ def common_points(centres: npt.ArrayLike, inner: npt.ArrayLike, outer: npt.Array
     s = np.array(points)
     violation = _violation(s, c, low, high)
     scale = float(np.abs(c).max() + 1.0)
-    return s[violation <= 1e-13 * scale], max(float(violation.min()), 0.0)
+    return s[violation <= _ON * scale], max(float(violation.min()), 0.0)
 
 
 def _violation(s: CArray, c: CArray, low: Array, high: Array) -> Array:

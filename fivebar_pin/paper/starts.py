@@ -14,6 +14,9 @@ from fivebar_pin.paper.rings import common_points
 
 __all__ = ["balanced_points", "mixtures", "only_point"]
 
+_OUTSIDE = 1e-12  # violation of the bounds, in mu rho or in mu, that is round-off [-]
+_SLACK = 1e-9  # the same of a start, which the search clips to the bounds [-]
+_CLOSEST = 1e-3  # distance of the first grid point from a centre [of the spread of the grid]
 _ALONE = 3e-8  # common points this close together [spread of the centres] are one: a touching point is a double root
 
 
@@ -33,7 +36,7 @@ def balanced_points(problem: Problem, mu: Array, *, each: int) -> list[Array]:
     low, high = problem.low[4:8], problem.high[4:8]
     rings = _rings(problem, mu)
     corners, violation = common_points(*rings)
-    if violation > 1e-12:
+    if violation > _OUTSIDE:
         raise InfeasibleError(
             f"No balanced linkage has rho between {low.tolist()} and {high.tolist()} with the mass ratios "
             f"{np.round(mu, 6).tolist()}: the bounds would have to give way by {violation:.3g} in mu rho. "
@@ -62,7 +65,7 @@ def _spelled(problem: Problem, mu: Array, s: CArray, *, each: int) -> list[Array
     for sides in product((0.0, np.pi), repeat=4):
         alpha = np.angle(l * np.exp(1j * np.array(sides)))
         rho = (l * np.exp(-1j * alpha)).real
-        inside = np.all((rho >= low - 1e-9) & (rho <= high + 1e-9), axis=1)
+        inside = np.all((rho >= low - _SLACK) & (rho <= high + _SLACK), axis=1)
         value = problem.weights[0] * np.sum(alpha**2, axis=1) + problem.weights[1] * np.sum((rho - 0.5) ** 2, axis=1)
         for k in _apart(np.where(inside, value, np.inf), s, 0.1 * float(np.ptp(shift)), each):
             starts.append((float(value[k]), np.concatenate([alpha[k], rho[k], mu])))
@@ -82,7 +85,7 @@ def _apart(value: Array, s: CArray, distance: float, count: int) -> list[int]:
 def _grid(shift: Array) -> CArray:
     """Return points around the centres where single l_i vanish, closer where they lie."""
     span = 2.0 * float(np.ptp(shift))
-    x = np.concatenate([-np.geomspace(1e-3, 1.0, 16)[::-1], [0.0], np.geomspace(1e-3, 1.0, 16)]) * span
+    x = np.concatenate([-np.geomspace(_CLOSEST, 1.0, 16)[::-1], [0.0], np.geomspace(_CLOSEST, 1.0, 16)]) * span
     around = (x[:, None] + 1j * x[None, :]).ravel()
     return np.asarray((around[None, :] - shift[:, None]).ravel())
 
@@ -103,9 +106,9 @@ def mixtures(low: Array, high: Array) -> list[Array]:
         wish = low + np.array(lean) * (high - low)
         short = 1.0 - wish.sum()
         room = (high - wish) if short > 0.0 else (wish - low)
-        if abs(short) <= 1e-12:  # round-off
+        if abs(short) <= _OUTSIDE:
             found.append(wish)
-        elif room.sum() >= abs(short) - 1e-12:
+        elif room.sum() >= abs(short) - _OUTSIDE:
             found.append(wish + short * room / room.sum())
     rows = {tuple(np.round(mu, 9)): mu for mu in found}
     return list(rows.values())[:: max(1, len(rows) // 12)]

@@ -18,7 +18,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io import load, save
-from fivebar_pin.shipped.bars import Mechanism, dyad, universal_angles, wrapped
+from fivebar_pin.shipped.tree_builder import TreeBuilder, dyad, universal_angles, wrapped
 
 __all__ = [
     "MECHANISMS",
@@ -90,7 +90,7 @@ def four_bar_reactionless() -> ClosedChain:
 
 def _four_bar(name: str, lengths: tuple[float, float, float, float], side: float) -> ClosedChain:
     crank, coupler, rocker, ground = lengths
-    m = Mechanism(name)
+    m = TreeBuilder(name)
     m.bar("crank", "", (0.0, 0.0, 0.0), crank)
     m.bar("coupler", "crank", (crank, 0.0, 0.0), coupler)
     m.bar("rocker", "", (ground, 0.0, 0.0), rocker)
@@ -106,7 +106,7 @@ def _four_bar(name: str, lengths: tuple[float, float, float, float], side: float
 def slider_crank() -> ClosedChain:
     """Return an offset slider-crank: the slider runs along x, 0.02 m above the crank's pivot."""
     crank, rod, offset, angle = 0.1, 0.3, 0.02, np.pi / 3.0
-    m = Mechanism("slider_crank")
+    m = TreeBuilder("slider_crank")
     m.bar("crank", "", (0.0, 0.0, 0.0), crank)
     m.bar("rod", "crank", (crank, 0.0, 0.0), rod)
     m.joint("slider", at=(0.0, offset, 0.0), kind=pin.JointModelPX(), limit=1.0)
@@ -147,10 +147,10 @@ _CORNER = (0.2, 0.12)
 """Third point of the six-bars' coupler, in its axes [m]."""
 
 
-def _crank_and_coupler(name: str) -> tuple[Mechanism, dict[str, float], complex]:
+def _crank_and_coupler(name: str) -> tuple[TreeBuilder, dict[str, float], complex]:
     """Return crank and ternary coupler, the home of the four-bar they belong to, and where the third point then is."""
     angle = np.pi / 3.0
-    m = Mechanism(name)
+    m = TreeBuilder(name)
     m.bar("crank", "", (0.0, 0.0, 0.0), 0.1)
     m.joint("coupler", "crank", at=(0.1, 0.0, 0.0))
     _plate(m, "coupler", 0.35, _CORNER)
@@ -160,13 +160,13 @@ def _crank_and_coupler(name: str) -> tuple[Mechanism, dict[str, float], complex]
     return m, {"crank": angle, "coupler": along - angle, "rocker": back}, corner
 
 
-def _plate(m: Mechanism, joint: str, length: float, corner: tuple[float, float]) -> None:
+def _plate(m: TreeBuilder, joint: str, length: float, corner: tuple[float, float]) -> None:
     """Give a joint's link a bar along x and an arm from its middle to a third point."""
     m.box(joint, (0.0, 0.0, 0.0), (length, 0.0, 0.0), width=0.02, thickness=0.01)
     m.box(joint, (corner[0], 0.0, 0.0), (*corner, 0.0), width=0.02, thickness=0.01)
 
 
-def _six_bar(m: Mechanism, home: dict[str, float], strut: float, output: float) -> ClosedChain:
+def _six_bar(m: TreeBuilder, home: dict[str, float], strut: float, output: float) -> ClosedChain:
     ends = {"B_coupler": 0.35, "B_rocker": 0.3, "G_strut": strut, "G_output": output}
     for name, length in ends.items():
         m.point(name, name[2:], (length, 0.0, 0.0))
@@ -178,7 +178,7 @@ def planar_3rrr() -> ClosedChain:
     corners = [0.35 * np.exp(1j * (np.pi / 2.0 + 2.0 * np.pi * k / 3.0)) for k in range(3)]
     arms = [0.12 * np.exp(1j * (np.pi / 2.0 + 2.0 * np.pi * k / 3.0)) for k in range(3)]
     heading, centre = 0.2, complex(0.02, 0.01)
-    m = Mechanism("planar_3rrr", gravity=(0.0, 0.0, -9.81))
+    m = TreeBuilder("planar_3rrr", gravity=(0.0, 0.0, -9.81))
     home: dict[str, float] = {}
     loops = []
     for k, corner in enumerate(corners):
@@ -210,7 +210,7 @@ def spatial_rssr() -> ClosedChain:
     """
     crank, rod, rocker = 0.1, 0.35, 0.25
     base, axes = np.array([0.3, 0.05, 0.1]), np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    m = Mechanism("spatial_rssr", gravity=(0.0, 0.0, -9.81))
+    m = TreeBuilder("spatial_rssr", gravity=(0.0, 0.0, -9.81))
     m.bar("crank", "", (0.0, 0.0, 0.0), crank)
     m.joint("rod_y", "crank", at=(crank, 0.0, 0.0), kind=pin.JointModelRY())
     m.joint("rod_z", "rod_y")
@@ -239,7 +239,7 @@ def delta() -> ClosedChain:
     which they enforce in the machine, is built in: it hangs on three sliding joints.
     """
     base, arm, rod, plate, drop = 0.15, 0.2, 0.4, 0.05, 0.4
-    m = Mechanism("delta", gravity=(0.0, 0.0, -9.81))
+    m = TreeBuilder("delta", gravity=(0.0, 0.0, -9.81))
     start, end = complex(base, 0.0), complex(plate, drop)  # radius and depth of a leg's ends
     angle, _ = dyad(start, end, arm, rod, -1.0)
     lean = float(np.angle(end - start - arm * np.exp(1j * angle)))

@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from fivebar_pin._arrays import Array, checked, numeric
-from fivebar_pin.dynamics.equations import Mode, System, Wrench
+from fivebar_pin.dynamics.equations import EquationsOfMotion, Slip
+from fivebar_pin.dynamics.wrenches import Wrench
 from fivebar_pin.errors import SingularityError, SolverError
-from fivebar_pin.mechanism.manifold import Chart, Point
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.manifold import Chart
+from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = [
     "ChartMotion",
@@ -30,7 +33,7 @@ __all__ = [
 _TURNED = 0.7  # cosine between chart and tangent space at which the chart is changed
 _FAR = 1.5  # distance from its middle at which a chart is changed [rad, or chain lengths]
 _SMOOTH = 0.02  # mismatch of a step with the velocities and accelerations at its ends, relative
-_LOST = 1e-7  # scaled singular value below which round-off decides on the direction of motion [-]
+_UNFELT = 1e-12  # mismatch that is round-off, however short the step [rad, or chain lengths]
 _NO_END = 1e-5  # scaled singular value that a step may not end below: round-off would show in the velocity [-]
 _NEARLY_SINGULAR = 1e-3  # scaled singular value at which a failure is put down to a bifurcation [-]
 
@@ -47,7 +50,7 @@ class Inputs:
     tau: Any
     external: Mapping[str, Wrench]
 
-    def applied(self, system: System, point: Point, t: float, v: Array) -> Array:
+    def applied(self, system: EquationsOfMotion, point: Configurations, t: float, v: Array) -> Array:
         """Return the generalised forces (1, nv) at one state."""
         q = point.q[0]
         wrenches = {
@@ -65,7 +68,7 @@ class Inputs:
 class ClosedState:
     """A closed configuration, its velocity (nv,) and the rank of the closures on this motion."""
 
-    point: Point
+    point: Configurations
     v: Array
     rank: int
 
@@ -75,7 +78,7 @@ class Node:
     """A state on the motion with its acceleration."""
 
     t: float
-    point: Point
+    point: Configurations
     v: Array
     a: Array
     jerk: Array  # backward difference of the accelerations
@@ -87,34 +90,34 @@ class ChartMotion:
     """The right-hand side in one chart, around one node."""
 
     def __init__(
-        self, system: System, inputs: Inputs, rank: int, chart: Chart, node: Node, mode: Mode | None = None
+        self, system: EquationsOfMotion, inputs: Inputs, rank: int, chart: Chart, node: Node, slip: Slip | None = None
     ) -> None:
         self.system, self.inputs, self.rank, self.chart, self.node = system, inputs, rank, chart, node
-        self.mode = mode
+        self.slip = slip
 
     def start(self) -> Array:
         """Return (xi, u) at the node."""
         xi = self.system.manifold.coordinates(self.chart, self.node.point.q[0])
         return np.concatenate([xi, self.chart.B.T @ (self.node.v / self.system.manifold.scale)])
 
-    def state(self, t: float, y: Array, guess: Array | None = None) -> tuple[Point, Array, Array] | None:
+    def state(self, t: float, y: Array, guess: Array | None = None) -> tuple[Configurations, Array, Array] | None:
         """Return the point, v (nv,) and a (nv,) of (xi, u); None where the chart does not reach."""
         manifold, f = self.system.manifold, self.chart.B.shape[1]
         if not np.all(np.isfinite(y)):
             return None
         point = manifold.solve(self.chart, y[:f], self.predict(t) if guess is None else guess, self.rank)
-        if point is None or sigma_of(point, self.rank) < _LOST:
+        if point is None or sigma_of(point, self.rank) < SINGULAR:
             return None
-        T = point.Vt[0, self.rank :].T  # tangent space here (nv, f)
+        T = point.independent.tangent(self.rank)[0]  # (nv, f)
         try:
             v = T @ np.linalg.solve(self.chart.B.T @ T, y[f:]) * manifold.scale
         except np.linalg.LinAlgError:
             return None
-        if self.mode is not None:
-            v[self.mode.stuck] = 0.0
+        if self.slip is not None:
+            v[self.slip.stuck] = 0.0
         applied = self.inputs.applied(self.system, point, t, v)
         with np.errstate(all="ignore"):
-            a = self.system.accelerations(point, v[None], applied, self.rank, self.mode)[0]
+            a = self.system.accelerations(point, v[None], applied, self.rank, self.slip)[0]
         return (point, v, a) if np.all(np.isfinite(a)) else None
 
     def rate(self, t: float, y: Array) -> Array:
@@ -133,9 +136,9 @@ class ChartMotion:
         dq = dt * (node.v + dt * (0.5 * node.a + dt / 6.0 * node.jerk))
         return np.asarray(self.system.manifold.loops.tree.integrate(node.point.q, dq[None])[0])
 
-    def worn(self, point: Point) -> bool:
+    def worn(self, point: Configurations) -> bool:
         """Whether another chart should take over at a point."""
-        cosines = np.linalg.svd(self.chart.B.T @ point.Vt[0, self.rank :].T, compute_uv=False)
+        cosines = np.linalg.svd(self.chart.B.T @ point.independent.tangent(self.rank)[0], compute_uv=False)
         if float(cosines[-1]) < _TURNED:
             return True
         tree = self.system.manifold.loops.tree
@@ -143,10 +146,12 @@ class ChartMotion:
         return bool(np.abs(away).max() > _FAR)
 
 
-def first_node(system: System, inputs: Inputs, state: ClosedState, t: float, mode: Mode | None = None) -> Node:
+def first_node(
+    system: EquationsOfMotion, inputs: Inputs, state: ClosedState, t: float, slip: Slip | None = None
+) -> Node:
     """Return the node of a state that begins a stretch of smooth motion."""
     applied = inputs.applied(system, state.point, t, state.v)
-    a = system.accelerations(state.point, state.v[None], applied, state.rank, mode)[0]
+    a = system.accelerations(state.point, state.v[None], applied, state.rank, slip)[0]
     return Node(t, state.point, state.v, a, np.zeros_like(a), sigma_of(state.point, state.rank), np.inf)
 
 
@@ -164,20 +169,21 @@ def next_node(motion: ChartMotion, t: float, y: Array) -> Node | None:
     return Node(t, point, v, a, (a - node.a) / (t - node.t), sigma, ahead)
 
 
-def sigma_of(point: Point, rank: int) -> float:
-    return float(point.s[0, rank - 1]) if rank else 1.0
+def sigma_of(point: Configurations, rank: int) -> float:
+    """Return the smallest singular value of the closures at the first of some configurations, scaled [-]."""
+    return float(point.independent.smallest(rank)[0])
 
 
-def is_smooth(system: System, node: Node, reached: Node) -> bool:
+def is_smooth(system: EquationsOfMotion, node: Node, reached: Node) -> bool:
     """Whether the way between two nodes agrees with the velocities and accelerations at both: no jump of branch."""
     scale, h = system.manifold.scale, reached.t - node.t
     way = system.manifold.loops.tree.difference(node.point.q, reached.point.q)[0] / scale
     expected = h * (0.5 * (node.v + reached.v) + h / 12.0 * (node.a - reached.a)) / scale
     size = max(float(np.abs(x).max(initial=0.0)) for x in (way, h * node.v / scale, h * reached.v / scale))
-    return float(np.abs(way - expected).max(initial=0.0)) <= _SMOOTH * size + 1e-12
+    return float(np.abs(way - expected).max(initial=0.0)) <= _SMOOTH * size + _UNFELT
 
 
-def between(system: System, node: Node, reached: Node, t: float) -> Array:
+def between(system: EquationsOfMotion, node: Node, reached: Node, t: float) -> Array:
     """Interpolate a configuration (nq,) between two nodes from q, v and a at both: quintic."""
     tree, h = system.manifold.loops.tree, reached.t - node.t
     s, way = (t - node.t) / h, tree.difference(node.point.q, reached.point.q)[0]

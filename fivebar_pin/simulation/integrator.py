@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.dynamics.equations import System
+from fivebar_pin.dynamics.equations import EquationsOfMotion
 from fivebar_pin.errors import SolverError
 from fivebar_pin.simulation.chart_motion import (
     ChartMotion,
@@ -37,6 +37,7 @@ __all__ = ["run"]
 
 
 _RETRIES = 40
+_SHORTEST = 1e-13  # step, as part of the time reached or a second, that no longer moves the time [-]
 _LOOK = 100  # steps after which the way done is looked at
 _NOWHERE = 1e-4  # share of the time that all the steps would cover at the present rate, below which they are not taken
 _CROSS = 2.0  # time to a singular instant, in usual steps, from which on one step over it is tried
@@ -45,7 +46,7 @@ _GAP = 0.467  # middle of the widest gap between the stages of DOP853, where a s
 
 
 def run(
-    system: System,
+    system: EquationsOfMotion,
     inputs: Inputs,
     state: ClosedState,
     times: Array,
@@ -93,7 +94,14 @@ class _Steps:
     """
 
     def __init__(
-        self, system: System, inputs: Inputs, state: ClosedState, start: float, end: float, rtol: float, atol: float
+        self,
+        system: EquationsOfMotion,
+        inputs: Inputs,
+        state: ClosedState,
+        start: float,
+        end: float,
+        rtol: float,
+        atol: float,
     ) -> None:
         self.system, self.inputs, self.rank, self.end, self.rtol = system, inputs, state.rank, end, rtol
         f = system.chain.nv - state.rank
@@ -124,7 +132,7 @@ class _Steps:
         for _ in range(_RETRIES):
             solver = self._solver = self._solver or self._start()
             solver.max_step = _longest(self.node, solver.h_abs)
-            if self.motion.mode is not None and self.motion.mode.stuck.size:
+            if self.motion.slip is not None and self.motion.slip.stuck.size:
                 solver.max_step = min(solver.max_step, self._still)
             message = solver.step()
             if solver.status == "failed":
@@ -135,7 +143,7 @@ class _Steps:
                 self.node, self.h = reached, solver.h_abs
                 return lambda: refine(motion, h, solver.dense_output())
             self.h, self._solver = 0.25 * (solver.t - self.node.t), None
-            if self.h < 1e-13 * max(1.0, abs(self.node.t)):
+            if self.h < _SHORTEST * max(1.0, abs(self.node.t)):
                 break
         raise failure(self.node, self.rank, "the step cannot be made short enough")
 
@@ -157,8 +165,8 @@ class _Steps:
 
     def _recentre(self) -> None:
         chart = self.system.manifold.chart_at(self.node.point, self.rank)
-        mode = self._watch.mode if self._watch else None
-        self.motion, self._solver = ChartMotion(self.system, self.inputs, self.rank, chart, self.node, mode), None
+        slip = self._watch.slip if self._watch else None
+        self.motion, self._solver = ChartMotion(self.system, self.inputs, self.rank, chart, self.node, slip), None
 
     def _start(self) -> Any:
         from scipy.integrate import DOP853

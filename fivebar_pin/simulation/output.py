@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.dynamics.equations import System
-from fivebar_pin.mechanism.manifold import Point
+from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.mechanism.closing import CLOSED
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.rank import UNDRIVEN, smallest_values
 from fivebar_pin.simulation.chart_motion import ChartMotion, Node, between, failure, sigma_of
 from fivebar_pin.simulation.singular_step import lagrange
 from fivebar_pin.trajectory import Trajectory
@@ -21,19 +23,18 @@ Interpolant = Callable[[float], Array]
 _CLOSE = 0.03  # scaled singular value below which a sample is interpolated from its neighbours, at most [-]
 _DIP = 0.2  # the same, of the larger value at the two ends of the step
 _THROUGH = 20  # states that such an interpolation goes through
-_DETERMINED = 1e-12  # scaled slope of the actuated joints below which they do not determine the motion [-]
 
 
 class Record:
     """The output samples, filled as the integration passes them."""
 
-    def __init__(self, system: System, times: Array) -> None:
+    def __init__(self, system: EquationsOfMotion, times: Array) -> None:
         n, chain = times.size, system.chain
         self.system, self.times, self.done = system, times, 0
         self.q, self.v, self.a = np.empty((n, chain.nq)), np.empty((n, chain.nv)), np.empty((n, chain.nv))
         self.residual = np.zeros(n)
 
-    def put(self, k: int, point: Point, v: Array, a: Array) -> None:
+    def put(self, k: int, point: Configurations, v: Array, a: Array) -> None:
         self.q[k], self.v[k], self.a[k] = point.q[0], v, a
         self.residual[k] = np.abs(point.residual).max(initial=0.0)
         self.done = k + 1
@@ -83,7 +84,7 @@ class _Across:
             raise failure(node, motion.rank, "the configuration is not determined over a whole step")
         self.times, self.rows = np.array(times), np.array(rows)
 
-    def at(self, t: float) -> tuple[Point, Array, Array]:
+    def at(self, t: float) -> tuple[Configurations, Array, Array]:
         """Return point, v (nv,) and a (nv,) at a time."""
         manifold, B = self.motion.system.manifold, self.motion.chart.B
         dq, v, a = np.split(lagrange(np.array((t - self.node.t) / self.h), self.times) @ self.rows, 3)
@@ -91,10 +92,10 @@ class _Across:
         dq = dq + manifold.scale * (B @ (xi - B.T @ (dq / manifold.scale)))
         v = v + manifold.scale * (B @ (u - B.T @ (v / manifold.scale)))
         q = manifold.loops.tree.integrate(self.motion.chart.q[None], dq[None])[0]
-        return manifold.project(q, 1e-12), v, a
+        return manifold.project(q, CLOSED), v, a
 
 
-def _complement(system: System, q: Array, rank: int) -> Array:
+def _complement(system: EquationsOfMotion, q: Array, rank: int) -> Array:
     """Return N (n, nv, na) of the actuated joints; nan where they do not determine the motion.
 
     With more motors than mobility, N is the one of least torque: N^T distributes a load over the motors with the
@@ -104,7 +105,9 @@ def _complement(system: System, q: Array, rank: int) -> Array:
     N = np.full((q.shape[0], chain.nv, chain.na), np.nan)
     if chain.na < chain.nv - rank or not chain.na:
         return N
-    T = np.swapaxes(system.manifold.at(q).Vt[:, rank:], 1, 2) * system.manifold.scale[:, None]  # (n, nv, f)
-    regular = np.linalg.svd(T[:, index] / system.manifold.scale[index, None], compute_uv=False)[:, -1] > _DETERMINED
-    N[regular] = np.matmul(T[regular], np.linalg.pinv(T[regular][:, index]))
+    tangent, scale = system.manifold.at(q).independent.tangent(rank), system.manifold.scale
+    driven = tangent[:, index]  # what the motors see of it (n, na, f)
+    regular = smallest_values(driven) > UNDRIVEN
+    T = tangent[regular] * scale[:, None]
+    N[regular] = np.matmul(T, np.linalg.pinv(T[:, index]))
     return N

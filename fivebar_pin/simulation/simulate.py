@@ -7,7 +7,7 @@ stabilise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -15,12 +15,13 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite, integer, number
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.equations import System, Wrench, check_frame
+from fivebar_pin.dynamics.equations import EquationsOfMotion
 from fivebar_pin.dynamics.forward import constant_torque, require_consistent
+from fivebar_pin.dynamics.wrenches import Wrench, require_frames
 from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.simulation.chart_motion import ClosedState, Inputs
 from fivebar_pin.simulation.integrator import run
-from fivebar_pin.springs import JointSpring, Spring
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Torque", "simulate"]
@@ -37,7 +38,6 @@ def simulate(
     tau: Torque = None,
     t: npt.ArrayLike | None = None,
     *,
-    springs: Iterable[Spring | JointSpring] = (),
     external: Mapping[str, Wrench] | None = None,
     initial: Literal["check", "project"] = "check",
     rtol: float = 1e-11,
@@ -57,7 +57,6 @@ def simulate(
         tau: torque of the actuated joints: constant (na,), one number where there is one motor, or a function
             (t, q, v) of either [N m or N]; no torque unless given.
         t: increasing output times (n,) [s]; always needed.
-        springs: springs and dampers.
         external: forces from outside: frame name -> wrench (6,) or a function (t, q, v) -> (6,), force [N] and moment
             [N m] in world axes at the frame's origin.
         initial: "check" refuses a state that does not keep the loops closed; "project" moves it to a near one that
@@ -88,21 +87,19 @@ def simulate(
     integer("max_steps", max_steps, least=1)
     if initial not in ("check", "project"):
         raise InvalidInputError("initial", initial, "must be 'check' or 'project'")
-    integer("max_steps", max_steps, least=1)
-    system = System.of(chain, tuple(springs))
-    for frame in external or {}:
-        check_frame(chain, frame)
+    system = EquationsOfMotion.of(chain)
+    require_frames(chain, external or {})
     state = _initial_state(system, checked("q", q, (chain.nq,)), checked("v", v, (chain.nv,)), initial)
     inputs = Inputs(tau if callable(tau) else constant_torque(chain, tau), dict(external or {}))
     return run(system, inputs, state, times, rtol=rtol, atol=atol, max_steps=max_steps, progress=progress)
 
 
-def _initial_state(system: System, q: Array, v: Array, initial: str) -> ClosedState:
+def _initial_state(system: EquationsOfMotion, q: Array, v: Array, initial: str) -> ClosedState:
     """Return the state brought to round-off, once it is consistent or asked to be made so."""
     manifold = system.manifold
     if initial == "check":
-        require_consistent(system, manifold.at(np.array(q[None])), v[None])
-    point = manifold.project(q, 1e-12)
+        require_consistent(manifold.at(np.array(q[None])), v[None])
+    point = manifold.project(q, CLOSED)
     rank = manifold.rank_of(point)
     if rank == system.chain.nv:
         raise InvalidInputError("mobility", 0, "must be at least one: the mechanism cannot move")

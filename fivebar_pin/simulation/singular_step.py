@@ -16,13 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.simulation.chart_motion import ChartMotion, Node, is_smooth, next_node
 
 __all__ = ["Collocated", "Crossing", "cross", "lagrange", "refine", "singular_ahead"]
 
 
-_SWEEPS = 40
+_SWEEPS, _SWEEPS_AT_LEAST = 40, 3  # substitutions at most, and before they may be found to stall
+_SETTLED, _GOOD = 1e-2, 0.5  # change of the result, in tolerances, that ends them, and that is good enough [-]
+_STALLED = 0.9  # of the change before, from which on they do not converge any further [-]
 _FLOOR = 1e-12  # least tolerance: what the round-off near the instant leaves
 _LOOK = 33  # instants at which the closures are looked at ahead
 
@@ -70,13 +72,13 @@ def singular_ahead(motion: ChartMotion, within: float) -> float | None:
     """Return the time after which the closures come nearest to losing rank, as predicted; None if not within."""
     node, manifold = motion.node, motion.system.manifold
     dt = np.linspace(0.0, within, _LOOK)
-    sigma = manifold.at(np.stack([motion.predict(node.t + s) for s in dt])).s[:, motion.rank - 1]
+    sigma = manifold.at(np.stack([motion.predict(node.t + s) for s in dt])).independent.smallest(motion.rank)
     k = int(np.argmin(sigma))
     if k in (0, _LOOK - 1):
         return None
     left, right = sigma[k] - sigma[k - 1], sigma[k + 1] - sigma[k]
     slope = max(-left, right)  # the least value lies where two lines of this slope meet
-    return float(dt[k] + 0.5 * dt[1] * (-left - right) / max(slope, 1e-300))
+    return float(dt[k] + 0.5 * dt[1] * (-left - right) / max(slope, TINY))
 
 
 def cross(motion: ChartMotion, h: float, rtol: float, atol: Array) -> Crossing | None:
@@ -128,9 +130,9 @@ def _substitute(motion: ChartMotion, method: _Gauss, rates: Array, h: float, rto
         if not np.all(np.isfinite(new)):
             return None
         before, moved, y = moved, float(np.max(np.abs(new - y) / (atol + rtol * np.abs(new)))), new
-        if moved < 1e-2 or (sweep > 3 and moved > 0.9 * before):
+        if moved < _SETTLED or (sweep > _SWEEPS_AT_LEAST and moved > _STALLED * before):
             break
-    return rates if moved < 0.5 else None
+    return rates if moved < _GOOD else None
 
 
 def lagrange(x: Array, c: Array) -> Array:

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
-from fivebar_pin.viz._geometry import Poses, View, body_points
+from fivebar_pin.springs import Spring
+from fivebar_pin.viz._geometry import Poses, View, body_points, spring_ends
 from fivebar_pin.viz._recording import Colour
 
 if TYPE_CHECKING:
@@ -43,11 +44,13 @@ COLOURS: dict[str, Colour] = {
     "joint": (0.20, 0.20, 0.22, 1.0),
     "closure": (0.98, 0.90, 0.20, 1.0),
     "ground": (0.55, 0.57, 0.60, 1.0),
+    "spring": (0.45, 0.55, 0.05, 1.0),
     "body com": (1.0, 1.0, 1.0, 1.0),
     "com": (0.80, 0.00, 0.55, 1.0),
     "force": (0.05, 0.05, 0.05, 1.0),
 }
 
+_WRITTEN = 1e-6  # difference of colours by the digits that files keep [-]
 _THICKNESS = 0.045
 """Radius of a link, as a part of the chain's characteristic length [-]."""
 
@@ -95,7 +98,7 @@ def is_counterweight(visual: Visual) -> bool:
     """Return whether a shape is a counterweight that `balancing.realise` has made: by its colour, also from a file."""
     from fivebar_pin.balancing.counterweights import COLOUR
 
-    return bool(np.allclose(visual.rgba, COLOUR, rtol=0.0, atol=1e-6))
+    return bool(np.allclose(visual.rgba, COLOUR, rtol=0.0, atol=_WRITTEN))
 
 
 def safe(name: str) -> str:
@@ -113,12 +116,13 @@ def body_names(chain: ClosedChain) -> tuple[str, ...]:
 
 
 def reach(chain: ClosedChain, poses: Poses) -> Array:
-    """Return points (k, 3) [m] that the mechanism passes: joints, ends of bodies, corners of shapes, mass centres."""
+    """Return points (k, 3) [m] that the mechanism passes: joints, ends of bodies and springs, corners, mass centres."""
     points = [poses.joints[:, j, :3, 3] for j in range(1, chain.model.njoints) if chain.model.parents[j] == 0]
     for j in range(1, chain.model.njoints):
         local = [*body_points(chain, j), np.array(chain.model.inertias[j].lever), *_visual_corners(chain, j)]
         R, p = poses.joints[:, j, :3, :3], poses.joints[:, j, :3, 3]
         points += [R @ x + p for x in local]
+    points += [end for s in chain.springs if isinstance(s, Spring) for end in spring_ends(chain, s, poses.joints)]
     return np.concatenate([*points, poses.com] if points else [np.zeros((1, 3)), poses.com])
 
 
@@ -147,5 +151,5 @@ def amid_ground(chain: ClosedChain) -> Array:
 
 def ground_closures(chain: ClosedChain) -> list[Array]:
     """Return the places of the closure frames that are fixed to the ground."""
-    frames = [find_frame(chain.model, f) for c in chain.closures for f in c.frames]
+    frames = [find_frame(chain.model, f) for c in chain.closures for f in c.ends]
     return [np.array(f.placement.translation) for f in frames if f.parentJoint == 0]

@@ -14,15 +14,18 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array, checked
 from fivebar_pin.chain import find_frame
 from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.mechanism.loops import loops_of
+from fivebar_pin.mechanism.plane import plane_normal
+from fivebar_pin.springs import Spring
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain
     from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes"]
+__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes", "spring_ends"]
 
-_PARALLEL = 1e-6
-"""Sine of the largest angle [-] between two axes that count as parallel."""
+_SAME = 1e-9  # distance of points that are one [of the body, and for its size at least so many m]
+_ALONG = 1e-9  # component that counts as none [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,13 +122,13 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
     """Return the points (k, 3) [m] that the body of a joint connects, in its own frame, its own joint first.
 
     These are the joints it carries and its closure frames; for the last body of a branch the farthest frame
-    on it, or its mass centre when there is none.
+    on it, or its mass centre when there is none. The ends of springs on it come last.
     """
     model = chain.model
     points = [np.zeros(3)]
     points += [np.array(model.jointPlacements[k].translation) for k in model.children[joint]]
     for closure in chain.closures:
-        for name in closure.frames:
+        for name in closure.ends:
             frame = find_frame(model, name)
             if frame.parentJoint == joint:
                 points.append(np.array(frame.placement.translation))
@@ -134,13 +137,23 @@ def body_points(chain: ClosedChain, joint: int) -> Array:
         ends.append(np.array(model.inertias[joint].lever))
         tip = max(ends, key=lambda p: float(np.linalg.norm(p)))
         points.append(tip)
+    held = [f for s in chain.springs if isinstance(s, Spring) for f in (s.frame1, s.frame2)]
+    frames = [find_frame(model, name) for name in held]
+    points += [np.array(f.placement.translation) for f in frames if f.parentJoint == joint]
     return _distinct(np.array(points))
+
+
+def spring_ends(chain: ClosedChain, spring: Spring, joints: Array) -> tuple[Array, Array]:
+    """Return where the ends of a spring are (n, 3) each [m], from the poses of the joint frames (n, njoints, 4, 4)."""
+    frames = (find_frame(chain.model, name) for name in (spring.frame1, spring.frame2))
+    first, second = (joints[:, f.parentJoint] @ f.placement.homogeneous for f in frames)
+    return first[:, :3, 3], second[:, :3, 3]
 
 
 def _distinct(points: Array) -> Array:
     """Return the points without repetitions, in their order."""
     kept: list[Array] = []
-    tolerance = 1e-9 * max(float(np.max(np.abs(points))), 1e-9)
+    tolerance = _SAME * max(float(np.max(np.abs(points))), _SAME)
     for point in points:
         if all(float(np.linalg.norm(point - other)) > tolerance for other in kept):
             kept.append(point)
@@ -151,7 +164,7 @@ def find_view(chain: ClosedChain, q: Array) -> View:
     """Return the axes of the picture: onto the plane of motion when there is one, else the usual upright axes."""
     gravity = np.asarray(chain.model.gravity.linear, dtype=np.float64)
     against = [-gravity / np.linalg.norm(gravity)] if np.linalg.norm(gravity) > 0.0 else []
-    normal = _plane_normal(chain, q)
+    normal = plane_normal(loops_of(chain).tree.poses(np.array(q)[None]).S, chain.length)
     x, y, z = np.eye(3)
     if normal is None:
         up = against[0] if against else z
@@ -164,33 +177,5 @@ def find_view(chain: ClosedChain, q: Array) -> View:
     up /= np.linalg.norm(up)
     right = np.cross(up, normal)
     # Of the two sides of the plane, look from the one that has x (else y) to the right.
-    facing = right[0] if abs(right[0]) > 1e-9 else right[1]
+    facing = right[0] if abs(right[0]) > _ALONG else right[1]
     return View(right * np.sign(facing or 1.0), up, planar=True)
-
-
-def _plane_normal(chain: ClosedChain, q: Array) -> Array | None:
-    """Return the unit normal of the plane that all motion is parallel to, or None."""
-    model, data = chain.model, chain.model.createData()
-    pin.computeJointJacobians(model, data, np.array(q))
-    turns, slides = [], []
-    for j in range(1, model.njoints):
-        first, width = model.idx_vs[j], model.nvs[j]
-        J = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        S = np.reshape(J, (6, model.nv))[:, first : first + width]
-        turns += [w / np.linalg.norm(w) for w in S[3:].T if np.linalg.norm(w) > 0.0]
-        slides += [u / np.linalg.norm(u) for u, w in zip(S[:3].T, S[3:].T, strict=True) if np.linalg.norm(w) == 0.0]
-    normal = turns[0] if turns else _slide_normal(slides)
-    if normal is None:
-        return None
-    tilted = any(np.linalg.norm(np.cross(w, normal)) > _PARALLEL for w in turns)
-    leaving = any(abs(u @ normal) > _PARALLEL for u in slides)
-    return None if tilted or leaving else np.asarray(normal)
-
-
-def _slide_normal(slides: list[Array]) -> Array | None:
-    """Return the normal of the plane of sliding directions, None when they do not span one."""
-    for u in slides[1:]:
-        normal = np.cross(slides[0], u)
-        if np.linalg.norm(normal) > _PARALLEL:
-            return np.asarray(normal / np.linalg.norm(normal))
-    return None

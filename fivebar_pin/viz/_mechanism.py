@@ -1,4 +1,4 @@
-"""Draw one mechanism into a recorder: bodies, joints, closures, ground, mass centres, trace and force arrow."""
+"""Draw one mechanism into a recorder: bodies, joints, closures, springs, ground, mass centres, trace, force."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
-from fivebar_pin.closures import ClosureKind
+from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.viz._drawing import (
     COLOURS,
     LINK_COLOURS,
@@ -20,13 +20,17 @@ from fivebar_pin.viz._drawing import (
     safe,
 )
 from fivebar_pin.viz._geometry import JointShape, body_points, joint_shapes
-from fivebar_pin.viz._recording import Recorder, along, pose
+from fivebar_pin.viz._recording import Recorder, along, pose, quaternions
+from fivebar_pin.viz._springs import draw_springs
 
 if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain
 
 __all__ = ["draw_mechanism"]
 
+_SMALLEST = 1e-6  # scale of an arrow of no length: none may be zero [-]
+_STILL = 1e-12  # step of a trace that has no direction [m]
+_SEEN = 1e-6  # length below which a line is not seen, as a part of the scene [-]
 _RIBBON_POINTS = 2000
 """Points of a trace that are drawn wide; the line itself holds all of them."""
 
@@ -45,6 +49,8 @@ def draw_mechanism(recorder: Recorder, path: str, drawing: Drawing) -> None:
         _move(recorder, node, drawing, drawing.poses.joints[:, j])
     _draw_visuals(recorder, path, drawing)
     _draw_closures(recorder, path, drawing)
+    _draw_segments(recorder, path, drawing)
+    draw_springs(recorder, path, drawing)
     _draw_ground(recorder, f"{path}/ground", drawing, shapes)
     _draw_com(recorder, path, drawing)
     if drawing.force is not None and drawing.arrow > 0.0:
@@ -115,22 +121,46 @@ def _draw_closures(recorder: Recorder, path: str, drawing: Drawing) -> None:
     """Draw both frames of each closure: a yellow pin on the first, a smaller dark one on the second."""
     model, r = drawing.chain.model, drawing.radius
     for closure in drawing.chain.closures:
-        for number, name in enumerate(closure.frames):
+        mark = closure.mark
+        for number, name in enumerate(closure.ends):
             frame = find_frame(model, name)
             node = f"{_node(drawing.chain, path, frame.parentJoint)}/closure {safe(closure.name)} {number + 1}"
             recorder.place(node, frame.placement.homogeneous)
             colour = COLOURS["closure"] if number == 0 else COLOURS["joint"]
             wide, long = (1.5 * r, 3.2 * r) if number == 0 else (0.7 * r, 3.6 * r)
-            axis = np.asarray(closure.axis, dtype=np.float64)
-            if closure.kind is ClosureKind.POINT and drawing.view.planar:
+            axis = mark.axis
+            if mark.shape == "ball" and drawing.view.planar:  # seen along the plane's normal it is a pin
                 rotation = drawing.poses.joints[0, frame.parentJoint, :3, :3] @ frame.placement.rotation
                 axis = rotation.T @ drawing.view.normal
-            if closure.kind is ClosureKind.WELD:
+            if mark.shape == "box":
                 recorder.box(f"{node}/mark", (2 * wide, 2 * wide, 2 * wide), colour, np.eye(4))
-            elif closure.kind is ClosureKind.POINT and not drawing.view.planar:
+            elif axis is None:
                 recorder.sphere(f"{node}/mark", wide, colour, np.eye(4))
             else:
-                recorder.cylinder(f"{node}/mark", wide, long, colour, pose(np.zeros(3), axis))
+                recorder.cylinder(f"{node}/mark", wide, mark.stretch * long, colour, pose(np.zeros(3), axis))
+
+
+def _draw_segments(recorder: Recorder, path: str, drawing: Drawing) -> None:
+    """Draw the rods of closures, and a thin line between joints that are coupled."""
+    for anchored in loops_of(drawing.chain).anchored:
+        for number, segment in enumerate(anchored.segments()):
+            poses = [drawing.poses.joints[:, j] for j in segment.joints]
+            ends = [M[:, :3, :3] @ p + M[:, :3, 3] for M, p in zip(poses, segment.points, strict=True)]
+            along_it = ends[1] - ends[0]
+            length = np.linalg.norm(along_it, axis=1)
+            if not length.max() > _SEEN * drawing.size:
+                continue  # coupled joints on one axis
+            node = f"{path}/closure {safe(anchored.closure.name)} line {number + 1}"
+            thick = (0.55 if segment.rod else 0.2) * drawing.radius
+            middle = pose(np.array([0.0, 0.0, 0.5]))
+            recorder.cylinder(f"{node}/stretch/bar", thick, 1.0, COLOURS["closure"], middle, on_top=not segment.rod)
+            directions = np.where(length[:, None] > 0.0, along_it, drawing.view.up)[drawing.keys]
+            turns = quaternions(np.array([along(d) for d in directions]))
+            stretched = np.maximum(length, _SEEN * drawing.size)[drawing.keys]
+            recorder.place(node, pose(ends[0][0], directions[0]))
+            recorder.animate(node, drawing.times, position=ends[0][drawing.keys], quaternion=turns)
+            one = np.ones_like(stretched)
+            recorder.animate(f"{node}/stretch", drawing.times, scale=np.stack([one, one, stretched], axis=1))
 
 
 def _draw_ground(recorder: Recorder, path: str, drawing: Drawing, shapes: tuple[JointShape, ...]) -> None:
@@ -175,7 +205,7 @@ def _ribbon(points: Array, normal: Array, half: float) -> tuple[Array, Array]:
     step = np.gradient(points, axis=0) if len(points) > 1 else np.zeros_like(points)
     side = np.cross(normal, step)
     length = np.linalg.norm(side, axis=1, keepdims=True)
-    side = np.divide(side, length, out=np.zeros_like(side), where=length > 1e-12)
+    side = np.divide(side, length, out=np.zeros_like(side), where=length > _STILL)
     vertices = np.concatenate([points + half * side, points - half * side])
     n = len(points)
     k = np.arange(n - 1)
@@ -195,11 +225,11 @@ def _draw_force(recorder: Recorder, path: str, drawing: Drawing, force: Array) -
         recorder.set(f"{path}/{part}", "renderOrder", 4)
     length = drawing.arrow * np.linalg.norm(force, axis=1)
     # A short arrow is drawn smaller as a whole; an arrow of no length keeps a scale above zero.
-    size = np.clip(length / (1.5 * head), 1e-6, 1.0)
-    shaft = np.maximum(length - head * size, 1e-6 * head)
-    directions = np.where(size[:, None] > 1e-6, force, drawing.view.up)
+    size = np.clip(length / (1.5 * head), _SMALLEST, 1.0)
+    shaft = np.maximum(length - head * size, _SMALLEST * head)
+    directions = np.where(size[:, None] > _SMALLEST, force, drawing.view.up)
     zero = np.zeros_like(length)
-    recorder.animate(path, drawing.times, quaternion=_quaternions(np.array([along(f) for f in directions])))
+    recorder.animate(path, drawing.times, quaternion=quaternions(np.array([along(f) for f in directions])))
     recorder.animate(f"{path}/shaft", drawing.times, scale=np.stack([size, size, shaft], axis=1))
     tips = np.stack([zero, zero, length], axis=1)
     recorder.animate(f"{path}/head", drawing.times, position=tips, scale=np.stack([size, size, size], axis=1))
@@ -209,14 +239,4 @@ def _move(recorder: Recorder, path: str, drawing: Drawing, placements: Array) ->
     """Move a node along placements (n, 4, 4)."""
     recorder.place(path, placements[0])
     shown = placements[drawing.keys]
-    recorder.animate(path, drawing.times, position=shown[:, :3, 3], quaternion=_quaternions(shown[:, :3, :3]))
-
-
-def _quaternions(rotations: Array) -> Array:
-    """Return x, y, z, w (k, 4) of rotations (k, 3, 3), without jumps of sign."""
-    from scipy.spatial.transform import Rotation
-
-    Q = np.asarray(Rotation.from_matrix(rotations).as_quat())
-    flips = np.cumprod(np.where(np.sum(Q[1:] * Q[:-1], axis=1) < 0.0, -1.0, 1.0))
-    Q[1:] *= flips[:, None]
-    return Q
+    recorder.animate(path, drawing.times, position=shown[:, :3, 3], quaternion=quaternions(shown[:, :3, :3]))

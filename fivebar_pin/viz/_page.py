@@ -14,6 +14,7 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
 from fivebar_pin.errors import InvalidInputError
+from fivebar_pin.springs import Spring
 from fivebar_pin.viz._drawing import COLOURS, LINK_COLOURS, Drawing, body_names, ground_closures, is_counterweight
 from fivebar_pin.viz._recording import Colour, Recorder
 from fivebar_pin.viz._stage import Stage
@@ -92,6 +93,8 @@ def _legend(drawings: Sequence[Drawing]) -> list[dict[str, str]]:
     entries += _counterweight_entry(drawings)
     if any(d.chain.closures for d in drawings):
         entries.append(_entry("ring", COLOURS["closure"], "loop closure"))
+    if any(isinstance(spring, Spring) for d in drawings for spring in d.chain.springs):
+        entries.append(_entry("trace", COLOURS["spring"], "spring"))
     if any(_stands(d.chain) for d in drawings):
         entries.append(_entry("block", COLOURS["ground"], "ground"))
     entries.append(_entry("rim", COLOURS["body com"], "mass centre of a link"))

@@ -15,7 +15,7 @@ from fivebar_pin.errors import FileFormatError
 if TYPE_CHECKING:
     from fivebar_pin.chain import Visual
 
-__all__ = ["Colour", "Recorder", "along", "pose"]
+__all__ = ["Colour", "Recorder", "along", "pose", "quaternions"]
 
 Colour = tuple[float, float, float, float]
 
@@ -38,6 +38,16 @@ def along(z: Array) -> Array:
     e1 = np.cross(np.eye(3)[int(np.argmin(np.abs(e3)))], e3)
     e1 /= np.linalg.norm(e1)
     return np.column_stack([e1, np.cross(e3, e1), e3])
+
+
+def quaternions(rotations: Array) -> Array:
+    """Return x, y, z, w (k, 4) of rotations (k, 3, 3), without jumps of sign."""
+    from scipy.spatial.transform import Rotation
+
+    Q = np.asarray(Rotation.from_matrix(rotations).as_quat())
+    flips = np.cumprod(np.where(np.sum(Q[1:] * Q[:-1], axis=1) < 0.0, -1.0, 1.0))
+    Q[1:] *= flips[:, None]
+    return Q
 
 
 def _hex(rgba: Colour) -> int:

@@ -17,6 +17,7 @@ __all__ = ["MECHANISMS", "Stage"]
 MECHANISMS = "/mechanisms"
 """Scene node of the mechanisms: below it everything is in metres and world axes."""
 
+_ROUND = 1e-9  # a number this little above a round one is that [of the number]
 _GRID = "/surroundings/grid"
 _GRID_COLOUR: Colour = (0.84, 0.86, 0.89, 1.0)
 _MARGIN = 6.0
@@ -134,4 +135,4 @@ def _outline(drawing: Drawing) -> Array:
 def _round_number(x: float) -> float:
     """Return the largest of 1, 2, 5 times a power of ten that is not above x."""
     power = 10.0 ** np.floor(np.log10(x))
-    return float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= x * (1.0 + 1e-9)))
+    return float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= x * (1.0 + _ROUND)))

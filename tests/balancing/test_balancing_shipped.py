@@ -30,13 +30,14 @@ RANKS = {  # force, dynamic, whether planar
 
 def states(chain: fb.ClosedChain, seed: int) -> fb.Trajectory:
     """Unrelated closed states at random speeds, consistent one by one."""
-    from fivebar_pin.kinematics.drive import consistent
+    from fivebar_pin.mechanism.complement import rates_of
+    from fivebar_pin.mechanism.configurations import Configurations
     from fivebar_pin.mechanism.loops import loops_of
 
     samples = random_samples(chain, 20, seed=seed)
     rng = np.random.default_rng(seed)
     va, aa = rng.normal(size=(2, len(samples), chain.na)) * 5.0
-    v, a, N = consistent(loops_of(chain), samples.q, va, aa)
+    v, a, N = rates_of(Configurations(loops_of(chain), samples.q), va, aa)
     return fb.Trajectory(np.arange(float(len(samples))), samples.q, v, a, N, np.zeros(len(samples)))
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import mechanisms
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
 from fivebar_pin import paper
+from fivebar_pin.balancing import conditions
 from fivebar_pin.balancing.conditions import balance_conditions
 from fivebar_pin.dynamics import inverse_dynamics
+from fivebar_pin.errors import SolverError
 from fivebar_pin.paper import table_1
 
 
@@ -165,3 +168,76 @@ def test_bad_requests_are_refused_with_what_is_known() -> None:
         balance_conditions(chain, "static", gravity=(0.0, 0.0, 0.0))
     with pytest.raises(fb.errors.InvalidInputError, match="samples"):
         balance_conditions(chain, "force", samples=3)
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "rank"),
+    [
+        ((1.0, 1e-1, 1e-5, 1e-8, 1e-12, 1e-15), 4),  # the widest gap
+        ((1.0, 1e-5, 1e-9, 1e-12, 1e-15), 2),  # a gap above a millionth is none, however wide
+        ((1.0, 2e-3, 4e-6, 8e-9, 1.6e-11, 3.2e-14, 6.4e-17), None),  # 500 to one everywhere: no decision
+        ((1.0, 5e-4, 2e-7, 1e-10, 5e-14, 2.5e-17), 2),  # 2500 to one once
+    ],
+)
+def test_a_rank_is_where_the_spectrum_has_a_clear_gap(
+    spectrum: tuple[float, ...], rank: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What counts as a condition is decided by a gap of a thousand that begins below a millionth, or not at all."""
+    rows = np.zeros((20, 12))
+    rows[range(len(spectrum)), range(len(spectrum))] = spectrum
+    monkeypatch.setattr(conditions, "_rows", lambda *_: rows)
+    if rank is None:
+        with pytest.raises(SolverError, match=r"show no clear gap \(best ratio 500 after"):
+            balance_conditions(mechanisms.four_bar(), "force")
+    else:
+        assert balance_conditions(mechanisms.four_bar(), "force").rank == rank
+
+
+def test_ratios_that_are_no_simple_fractions_keep_all_their_digits() -> None:
+    """The factor of the crank's first moment is b / a, also where a fraction lies close to it."""
+    a, b = 0.4, 1.1 + 1e-6
+    found = balance_conditions(mechanisms.four_bar((a, b, 0.9, 1.0)), "force")
+    names = list(found.space.names)
+    row = next(row for row in found.reduced if row[names.index("mcx(coupler)")] == 1.0)
+    assert row[names.index("mcx(crank)")] == pytest.approx(-b / a, rel=1e-9)
+    assert row[names.index("mcx(crank)")] != -2.75
+
+
+def test_moment_conditions_hold_angular_momentum_about_their_own_point() -> None:
+    """About any other point it changes by the lever times the momentum, which these conditions leave."""
+    chain, about = mechanisms.slider_crank(), np.array([0.3, -0.5, 0.0])
+    found, from_origin = (balance_conditions(chain, "moment", about=point) for point in (about, np.zeros(3)))
+    moved = fb.drive(chain, fb.motion.harmonic(np.linspace(0.0, 1.0, 21), 0.9, 0.4, period=1.0))
+    momentum = fb.balancing.regressors.regressor(chain, moved, "angular_momentum", about=about)
+    sizes = []
+    for those in (found, from_origin):
+        x = those.space.of(chain.inertial_parameters).reshape(-1) / those.space.scale
+        x = ((x - those.basis.T @ (those.basis @ x)) * those.space.scale).reshape(-1, 4)
+        pi = np.zeros((3, 10))
+        pi[:, [0, 1, 2, 9]] = x
+        sizes.append(np.abs(momentum(pi)[:, 2]).max())
+    assert sizes[0] < 1e-12
+    assert sizes[1] > 1e-2
+
+
+def test_a_slide_out_of_the_plane_makes_the_conditions_spatial() -> None:
+    model = pin.Model()
+    arm = mechanisms.add(model, 0, pin.JointModelRZ(), mechanisms.at(), "arm", mechanisms.body(1))
+    mechanisms.add(model, arm, pin.JointModelPZ(), mechanisms.at(0.5), "lift", mechanisms.body(2))
+    chain = fb.ClosedChain(model, (), ("arm", "lift"))
+    found = balance_conditions(chain, "force")
+    assert not found.space.planar
+    assert "m(lift) = 0" in found.equations  # nothing else can hold the mass centre at its height
+    flat = balance_conditions(chain.with_actuated(("arm", "lift")), "force", space="spatial")
+    assert flat.rank == found.rank
+    with pytest.raises(fb.errors.InvalidInputError, match="parallel planes"):
+        balance_conditions(chain, "force", space="planar")
+
+
+@pytest.mark.parametrize("off", [1e-2, 1e-4])
+def test_a_branch_begins_at_a_configuration_that_is_closed(off: float) -> None:
+    chain = mechanisms.four_bar()
+    near = fb.assemble(chain, [0.8])
+    with pytest.raises(fb.errors.AssemblyError, match="near is not closed: closure pin stays open by"):
+        balance_conditions(chain, "force", near=near + off * np.array([0.0, 1.0, 0.0]))
+    assert balance_conditions(chain, "force", near=near + 1e-9).rank == 4

@@ -422,3 +422,140 @@ def test_a_solver_that_is_not_installed_names_its_package(monkeypatch: pytest.Mo
 def test_regions_beyond_what_can_be_told_from_round_off_are_refused(region: Ball | Box) -> None:
     with pytest.raises(InvalidInputError, match=r"region of body .* must lie within 60000 m"):
         balance(case_I()[0], "force", region=region)
+
+
+def test_no_body_loses_more_than_half_of_its_mass() -> None:
+    """Drilling both distal links evenly makes everything lighter without end: the bound is what stops it."""
+    chain, _ = case_I()
+    bodies = ["theta_psi", "phi_gamma"]
+    design = balance(chain, "force", region=Ball(REACH), remove=bodies)
+    taken = {c.body: c.mass for c in design.removed}
+    for body in bodies:
+        whole = chain.inertial_parameters[chain.joints.index(body), 0]
+        assert taken[body] == pytest.approx(0.5 * whole, rel=1e-6)
+
+
+def gimbal(side: tuple[float, float]) -> fb.ClosedChain:
+    """Return a body of 1 kg on three crossing hinges; 1 kg at (0.5, 0, 0.5) times `side` balances its force."""
+    lever = -0.5 * np.array([side[0], 0.0, side[1]])
+    inertia = np.diag([3.0, 3.0, 3.0])
+    inertia[0, 2] = inertia[2, 0] = -0.5 * side[0] * side[1]
+    model = pin.Model()
+    model.gravity.linear = np.zeros(3)
+    joint = 0
+    for name, kind in (("x", pin.JointModelRX), ("y", pin.JointModelRY), ("z", pin.JointModelRZ)):
+        own = pin.Inertia(1.0, lever, inertia) if name == "z" else pin.Inertia(1.0, np.zeros(3), np.eye(3))
+        joint = mechanisms.add(model, joint, kind(), mechanisms.at(), name, own)
+    return fb.ClosedChain(model, (), ("x", "y", "z"))
+
+
+@pytest.mark.parametrize("side", [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
+def test_material_in_a_box_lies_within_its_corners(side: tuple[float, float]) -> None:
+    """Spinning about z the body shakes by w^2 I_xz, 0.75 w^2 as it is.
+
+    Half-way to a corner of a box of half lengths one, the mean of (1 - x)(1 - z) >= 0 leaves the added kilogram no
+    product of inertia against it; extents along the edges alone would let it take 0.5 away.
+    """
+    chain = gimbal(side)
+    t = np.linspace(0.0, 1.0, 5)
+    spin = fb.Motion(t, np.outer(t, [0.0, 0.0, 2.0]), np.tile([0.0, 0.0, 2.0], (5, 1)), np.zeros((5, 3)))
+    design = balance(
+        chain,
+        "force",
+        minimise="rms_shaking_moment",
+        motions=spin,
+        bodies=["z"],
+        region=Box((2.0, 2.0, 2.0)),
+        masses=(0.0, 1.0),
+        material=None,
+    )
+    assert design.objective == pytest.approx(0.75 * 4.0, rel=1e-6)
+    assert design.residual < 1e-14
+
+
+def with_frame(rotation: np.ndarray, place: tuple[float, float, float]) -> fb.ClosedChain:
+    """Return case I with a frame `askew` on the link psi."""
+    chain, _ = case_I()
+    model = chain.model.copy()
+    psi = model.getJointId("psi")
+    model.addFrame(pin.Frame("askew", psi, 0, pin.SE3(rotation, np.array(place)), pin.FrameType.OP_FRAME))
+    return fb.ClosedChain(model, chain.closures, chain.actuated)
+
+
+@pytest.mark.parametrize("kind", [Box, Ellipsoid])
+def test_a_region_means_the_same_in_the_axes_of_any_frame_of_its_body(kind: type) -> None:
+    """Edges and centre are those of the frame, wherever the normal of the plane lies among them."""
+    turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    chain = with_frame(turn, (0.01, -0.02, 0.0))
+    edges, center = np.array([0.09, 0.03, 0.5]), np.array([-0.03, 0.01, 0.0])
+    own = kind(edges, center)
+    other = kind(turn.T @ edges, turn.T @ (center - [0.01, -0.02, 0.0]), frame="askew")
+    one, two = (
+        balance(
+            chain, "force", material=None, region={"psi": region}, bodies=["psi", "theta_psi", "phi_gamma", "gamma"]
+        )
+        for region in (own, other)
+    )
+    assert one.feasible
+    assert two.objective == pytest.approx(one.objective, rel=1e-6)
+    np.testing.assert_allclose(two.parameters[2, :3], one.parameters[2, :3], atol=1e-5)
+
+
+@pytest.mark.parametrize("tilt", [1e-3, 0.1, 1.2])
+def test_a_box_that_stands_askew_to_the_plane_is_refused(tilt: float) -> None:
+    chain = with_frame(pin.rpy.rpyToMatrix(tilt, 0.0, 0.0), (0.0, 0.0, 0.0))
+    with pytest.raises(InvalidInputError, match="must have one edge along the normal"):
+        balance(chain, "force", region={"psi": Box((0.2, 0.2, 0.2), frame="askew")})
+    turned = with_frame(pin.rpy.rpyToMatrix(0.0, 0.0, tilt), (0.0, 0.0, 0.0))
+    assert balance(turned, "force", region={"psi": Box((0.2, 0.2, 0.2), frame="askew")}).feasible
+
+
+def test_a_bound_on_a_mean_square_bounds_the_mean_of_the_squares() -> None:
+    chain, path = case_I()
+    free = balance(chain, "force", material=None, region=Ball(REACH), motions=path)
+    limit = 0.9 * free.after["rms_torque"] ** 2
+    bounded = balance(
+        chain, "force", material=None, region=Ball(REACH), motions=path, limits={"mean_square_torque": limit}
+    )
+    assert bounded.after["rms_torque"] ** 2 == pytest.approx(limit, rel=1e-5)
+    both = inverse_dynamics(bounded.chain, path).torque
+    assert (both**2).sum(axis=1).mean() == pytest.approx(limit, rel=1e-5)
+
+
+def test_torque_is_bounded_in_both_directions() -> None:
+    """A motion and its mirror in time need opposite torques; neither passes the bound."""
+    chain, path = case_I()
+    free = balance(chain, "force", material=None, region=Ball(REACH), motions=path)
+    tau = inverse_dynamics(free.chain, path).torque
+    for k, name in enumerate(("least", "largest")):
+        limit = 0.9 * abs(tau[:, 0].min() if name == "least" else tau[:, 0].max())
+        design = balance(
+            chain, "force", material=None, region=Ball(REACH), motions=path, limits={"peak_torque": [limit, 10.0]}
+        )
+        assert np.abs(inverse_dynamics(design.chain, path).torque[:, 0]).max() <= limit, k
+
+
+def test_a_redesigned_body_keeps_between_half_and_twice_its_mass() -> None:
+    chain, _ = case_I()
+    design = balance(chain, "force", mode="redesign", minimise="added_mass", material=None, region=Ball(REACH))
+    ratio = design.parameters[:, 0] / chain.inertial_parameters[:, 0]
+    assert ratio.min() == pytest.approx(0.5, abs=1e-6)
+    assert (ratio >= 0.5 - 1e-9).all() and (ratio <= 2.0 + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"masses": (-1.0, 1.0)}, "0 <= low <= high"),
+        ({"minimise": {"added_mass": 1.0, "distance": -1.0}}, "one finite number from 0"),
+        ({"minimise": {"added_mass": 1e31}}, "one finite number from 0"),
+        ({"limits": {"peak_torque": 0.0}}, "positive and finite"),
+        ({"limits": {"rms_torque": 0.0}}, "positive and finite"),
+        ({"limits": {"added_mass": np.inf}}, "positive and finite"),
+        ({"mode": "redesign", "remove": ["psi"]}, "no meaning for a redesign"),
+    ],
+)
+def test_numbers_out_of_their_bounds_are_named(options: dict[str, object], said: str) -> None:
+    chain, path = case_I()
+    with pytest.raises(InvalidInputError, match=said):
+        balance(chain, "force", **{"motions": path, **options})  # type: ignore[arg-type]

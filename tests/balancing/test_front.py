@@ -10,6 +10,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin import paper
 from fivebar_pin.balancing import Ball, alici_shirinzadeh, balance, balance_conditions, compare, pareto
+from fivebar_pin.balancing.branches import branches
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, UnknownNameError
 
@@ -156,3 +157,20 @@ def test_a_design_is_for_the_branch_that_is_meant() -> None:
         assert len(design.alternatives) == 1
         assert balance(design.original, "dynamic", near=design.alternatives[0]).feasible
         assert "possible on the branch" in repr(design)
+
+
+def test_a_front_of_objectives_that_agree_is_its_two_ends() -> None:
+    """What is least in the one is least in the other: there is nothing to trade."""
+    chain, path = case_I()
+    front = pareto(chain, "force", "rms_torque", "mean_square_torque", 5, motions=path, region=REACH)
+    assert len(front) == 2
+    np.testing.assert_allclose(front.values[0], front.values[1], rtol=1e-5)
+
+
+def test_a_mechanism_without_special_lengths_has_no_branch_with_fewer_conditions() -> None:
+    chain = mechanisms.four_bar()
+    assert branches(chain, balance_conditions(chain, "dynamic")) == ()
+    special, _ = antiparallelogram()
+    together = balance_conditions(special, "dynamic")
+    found = branches(special, together)
+    assert found and all(b.conditions.rank < together.rank for b in found)

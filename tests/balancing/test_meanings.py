@@ -21,7 +21,21 @@ ABOUT = (0.07, -0.11, 0.05)
 OBJECTIVES = ("inertia", *(f"{s}_{m}" for m in MEASURES for s in ("rms", "peak", "mean_square")))
 TERMS = ("added_mass", *OBJECTIVES)
 OFF_PLANE = ("five_bar", "five_bar, tilted", "slider_crank, tilted", "rssr")  # bodies at different heights
+SPRUNG = ("five_bar, tilted, sprung", "slider_crank, sprung", "rssr, sprung")
 GRAVITY = (3.0, -8.0, 4.0)
+
+
+def springs_of(kind: str) -> tuple[fb.Spring | fb.JointSpring, ...]:
+    """Springs and dampers to the ground, between bodies and on joints."""
+    return {
+        "five_bar": (
+            fb.Spring("universe", "left_elbow_body", 30.0, 0.1, 2.0),
+            fb.Spring("left_body", "right_elbow_body", 20.0, 0.0),
+            fb.JointSpring("right_elbow", 3.0, 0.4, 0.6),
+        ),
+        "slider_crank": (fb.Spring("slider_body", "crank_body", 30.0, 0.3, 2.0), fb.JointSpring("slider", 11.0, 0.2)),
+        "rssr": (fb.Spring("universe", "coupler_body", 30.0, 0.05), fb.JointSpring("crank", 4.0, 1.0, 0.1)),
+    }[kind]
 
 
 @cache
@@ -30,8 +44,8 @@ def moving(name: str) -> tuple[fb.ClosedChain, fb.Trajectory]:
     if name in fb.io.shipped():
         chain = fb.load(fb.io.shipped_path(name))
     else:
-        kind, _, tilted = name.partition(", ")
-        base = mechanisms.TILTED if tilted else mechanisms.AT_ORIGIN
+        kind, *how = name.split(", ")
+        base = mechanisms.TILTED if "tilted" in how else mechanisms.AT_ORIGIN
         chain = {
             "five_bar": mechanisms.five_bar,
             "slider_crank": mechanisms.slider_crank,
@@ -40,6 +54,8 @@ def moving(name: str) -> tuple[fb.ClosedChain, fb.Trajectory]:
     model = chain.model.copy()
     model.armature[:], model.damping[:] = 1e-4, 1e-3
     chain = fb.ClosedChain(model, chain.closures, chain.actuated, chain.name)
+    if name.endswith("sprung"):
+        chain = chain.with_springs(springs_of(kind))
     if name in fb.io.shipped():
         path = sway(chain, standing(chain), samples=13)
         assert path is not None
@@ -78,7 +94,7 @@ def assert_same(found: float, wanted: float, scale: float, what: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["force", None])
-@pytest.mark.parametrize("name", [*fb.io.shipped(), *OFF_PLANE])
+@pytest.mark.parametrize("name", [*fb.io.shipped(), *OFF_PLANE, *SPRUNG])
 def test_every_road_gives_a_term_the_same_value(name: str, kind: str | None) -> None:
     chain, path = moving(name)
     region, bodies = Ball(0.5 * chain.length), None if kind else list(chain.joints)
@@ -96,6 +112,12 @@ def test_every_road_gives_a_term_the_same_value(name: str, kind: str | None) -> 
     design = problem.solve({"added_mass": 1.0} if kind else {"rms_torque": 1.0, "added_mass": 1e-3})
     assert design.feasible
     check(design, path, tuple(dict.fromkeys(TERMS)))
+    assert design.chain.springs == chain.springs
+    if chain.springs:  # they are felt: without them the same bodies take another torque and load other bearings
+        bare = inverse_dynamics(design.chain.with_springs(()), path, about=ABOUT)
+        sprung = inverse_dynamics(design.chain, path, about=ABOUT)
+        assert np.abs(sprung.torque - bare.torque).max() > 0.1
+        assert np.abs(sprung.bearing_force - bare.bearing_force).max() > 0.1
 
 
 @pytest.mark.parametrize("name", OFF_PLANE)

@@ -16,6 +16,13 @@ from fivebar_pin.dynamics import inverse_dynamics
 ABOUT = (0.03, -0.02, 0.05)
 
 
+def sprung(chain: fb.ClosedChain) -> tuple[fb.Spring | fb.JointSpring, ...]:
+    """A spring from the ground and one between the first and the last body, dampers, and one on every joint."""
+    first, last = (f"{chain.joints[k]}_body" for k in (0, -1))
+    between = (fb.Spring("universe", last, 20.0, 0.1, 1.0), fb.Spring(first, last, 10.0, 0.0))
+    return (*between, *(fb.JointSpring(j, 2.0, 0.3, 0.1) for j in chain.joints))
+
+
 @cache
 def driven(name: str) -> tuple[fb.ClosedChain, fb.Trajectory]:
     """A test mechanism with armature, damping and dry friction, in motion."""
@@ -35,6 +42,8 @@ def driven(name: str) -> tuple[fb.ClosedChain, fb.Trajectory]:
     model.armature[:], model.damping[:], model.upperDryFrictionLimit[:] = 0.01 * k, 0.1 * k, 0.2 * k
     model.gravity.linear = np.array([3.0, -8.0, 4.0])
     chain = fb.ClosedChain(model, chain.closures, chain.actuated)
+    if name in ("slider_crank", "rssr", "double_four_bar"):
+        chain = chain.with_springs(sprung(chain))
     t = np.linspace(0.0, 1.0, 11)
     start = {"rssr": 0.3, "rscr": 0.4, "bennett": 1.1, "double_four_bar": 1.2}.get(name, 1.0)
     size = 0.01 if name == "rscr" else 0.1
@@ -57,7 +66,7 @@ def direct(chain: fb.ClosedChain, trajectory: fb.Trajectory) -> dict[str, np.nda
         "frame_force": loads.frame_force,
         "frame_moment": loads.frame_moment,
         "torque": loads.torque,
-        "gravity_torque": inverse_dynamics(chain, at_rest).torque,
+        "gravity_torque": inverse_dynamics(chain.with_springs(()), at_rest).torque,
         "potential_energy": loads.potential_energy[:, None],
         "kinetic_energy": loads.kinetic_energy[:, None],
         "joint_reactions": loads.joint_reactions.reshape(n, -1),

@@ -457,3 +457,22 @@ def test_branches_states_its_arguments() -> None:
     chain = shipped.four_bar_antiparallelogram()
     with pytest.raises(TypeError, match="unexpected keyword"):
         branches(chain, balance_conditions(chain, "dynamic"), samples=3)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("change", ["joint", "frame", "kind", "axis"])
+def test_conditions_belong_to_all_lengths_and_closures_of_their_mechanism(change: str) -> None:
+    """A joint moved, a closure's frame moved, another kind or axis of closure: each is another mechanism."""
+    lengths = (0.4, 1.1, 0.9, 1.0)
+    own = mechanisms.four_bar(lengths, kind="revolute")
+    found = balance_conditions(own, "force")
+    (closure,) = own.closures
+    other = {
+        "joint": mechanisms.four_bar((0.4, 1.1, 0.9, 1.001), kind="revolute"),
+        "frame": mechanisms.four_bar((0.4, 1.101, 0.9, 1.0), kind="revolute"),
+        "kind": mechanisms.four_bar(lengths),
+        "axis": fb.ClosedChain(own.model, (fb.Closure(closure.frames, "revolute", (0.0, 0.0, -1.0)),), own.actuated),
+    }[change]
+    with pytest.raises(InvalidInputError, match="must belong to four_bar"):
+        balance_problem(other, "force", conditions=found)
+    again = mechanisms.four_bar(lengths, kind="revolute").with_actuated(["rocker"])
+    assert balance_problem(again, "force", conditions=found).conditions is found

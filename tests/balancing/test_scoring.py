@@ -126,3 +126,43 @@ def test_scores_do_not_depend_on_how_the_designs_are_cut_into_pieces(count: int)
         alone = score(chain, paths, X[k])
         for term in ("rms_shaking_force", "rms_shaking_moment", "rms_torque"):
             assert together[term][k] == pytest.approx(alone[term][0], rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("mass", "moment", "second"),
+    [
+        (1.0, 0.0, (-1.0, 0.0, 0.0)),  # the trace
+        (1.0, 0.0, (-1.0, -1.0, 3.0)),  # two negative ones, which a determinant does not see
+        (1.0, 0.0, (-0.1, 10.0, 10.0)),  # one negative one, which only the determinant sees
+        (0.0, 1.0, (1.0, 0.0, 0.0)),  # a first moment without mass
+        (-1e-6, 0.0, (1.0, 1.0, 1.0)),
+    ],
+)
+def test_a_body_is_physical_by_its_mass_and_all_its_second_moments(
+    mass: float, moment: float, second: tuple[float, float, float]
+) -> None:
+    """Whichever axis the wrong moment lies along."""
+    chain, paths = five_bar()
+    good = designs(chain, 1)[0]
+    score(chain, paths[0], good, terms="added_mass")
+    for turn in range(3):
+        x, y, z = np.roll(second, turn)
+        bad = good.copy()
+        bad[2] = [mass, *np.roll([moment, 0.0, 0.0], turn), y + z, 0.0, x + z, 0.0, 0.0, x + y]
+        with pytest.raises(InvalidInputError, match="design 0, body psi"):
+            score(chain, paths[0], bad, terms="added_mass")
+
+
+def test_the_mass_gained_is_small_against_the_masses_it_is_the_difference_of() -> None:
+    chain, paths = five_bar()
+    found = score(chain, paths[0], chain.inertial_parameters, terms=("added_mass", "inertia"))
+    assert abs(found["added_mass"][0]) <= 1e-15 * found.scales["added_mass"]
+    assert found.scales["added_mass"] == pytest.approx(2.0 * chain.mass)
+    assert "added_mass from 0;" in repr(found) or "added_mass from 0," in repr(found)
+
+
+def test_a_distance_is_a_term_of_designs_and_not_of_scores() -> None:
+    chain, paths = five_bar()
+    for terms in (("distance",), ("rms_torque", "distance"), ()):
+        with pytest.raises(InvalidInputError, match="must be some of"):
+            score(chain, paths[0], designs(chain, 1), terms=terms)

@@ -206,6 +206,39 @@ def test_no_answer_is_believed_unchecked(kind: str, monkeypatch: pytest.MonkeyPa
     assert kind == "unbounded" or caught.value.residual > caught.value.tolerance
 
 
+@pytest.mark.parametrize(
+    ("x", "z", "q"),
+    [
+        (0.0, 0.0, 0.0),  # outside the cone, x >= 1; no slope, no gap
+        (1.0, 0.0, 1.0),  # the optimum, without the multiplier that proves it: slope and gap
+        (1.5, 1.0, 1.0),  # inside, with the right multiplier: a gap alone
+    ],
+)
+def test_each_part_of_optimality_is_checked_by_itself(
+    x: float, z: float, q: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = Program(1, (block("nonneg", [[1]], [-1]),), np.full(1, 10.0))
+
+    def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
+        yield answers.Answer("solved", np.array([x]), np.array([z]), "solved")
+
+    monkeypatch.setitem(SOLVERS, "clarabel", wrong)
+    with pytest.raises(SolverError, match="stopped at a residual"):
+        solve(program, np.zeros(1), np.array([q]))
+
+
+def test_a_slope_that_is_left_shows_where_there_is_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """x = 0 of -x over x >= 0: its value is that of z = 0, and yet it is no optimum."""
+    program = Program(1, (block("nonneg", [[1]], [0]),), np.full(1, 10.0))
+
+    def wrong(problem: object, tolerance: float) -> Iterator[answers.Answer]:
+        yield answers.Answer("solved", np.zeros(1), np.zeros(1), "solved")
+
+    monkeypatch.setitem(SOLVERS, "clarabel", wrong)
+    with pytest.raises(SolverError, match=r"stopped at a residual of 0\.5"):
+        solve(program, np.zeros(1), np.array([-1.0]))
+
+
 def test_multipliers_outside_the_dual_cone_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """x = 6 is not the least; z = (1, -2, 0) has no residual and no gap to 6, but is no multiplier."""
     program = Program(1, STANDARD[1].blocks, np.full(1, 10.0))
@@ -377,3 +410,21 @@ def test_the_scaling_of_a_cone_takes_its_unit_to_the_point_and_stays_inside(cone
         W = scaling(cone, z)
         np.testing.assert_allclose(W @ unit, z, atol=1e-7)
         assert outside(cone, W @ projected(cone, rng.normal(size=6))) < 1e-7
+
+
+@pytest.mark.parametrize("region", [Ball(0.1, (0.02, -0.03, 0.0)), Box((0.2, 0.1, 0.1), center=(0.03, 0.0, 0.0))])
+@pytest.mark.parametrize("remove", [(), ("theta_psi", "phi_gamma")], ids=["added", "removed"])
+def test_no_solution_is_larger_than_the_sizes_that_bounds_are_taken_over(
+    region: object, remove: tuple[str, ...]
+) -> None:
+    """In any direction: a proof within sizes that solutions do not keep would prove nothing."""
+    chain, _ = balance_problems.moved("five_bar_case_I")
+    problem = balance_problem(chain, None, region=region, masses=(0.0, 0.5), remove=remove, material=None)
+    program, rng = problem.program, np.random.default_rng(5)
+    assert np.isfinite(problem.sizes).all()
+    largest = np.zeros(problem.n)
+    for _ in range(20):
+        x = solve(program, np.zeros(program.n), rng.normal(size=program.n) * np.exp(rng.normal(size=program.n))).x
+        assert x is not None
+        largest = np.maximum(largest, np.abs(x[: problem.n]))
+    assert (largest <= problem.sizes * (1.0 + 1e-6) + 1e-9).all()

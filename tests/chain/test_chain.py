@@ -10,6 +10,7 @@ import pytest
 from mechanisms import AT_ORIGIN, add, at, body, double_four_bar, five_bar, four_bar, point, rscr, slider_crank
 
 import fivebar_pin as fb
+from fivebar_pin import errors
 from fivebar_pin.chain import Visual, find_frame
 from fivebar_pin.errors import FiveBarPinError, InvalidInputError, UnknownNameError
 
@@ -155,8 +156,10 @@ def test_visuals_are_checked():
 
 
 def test_every_error_belongs_to_the_family():
-    for kind in (InvalidInputError, UnknownNameError):
-        assert issubclass(kind, FiveBarPinError)
+    """One name catches them all, whoever adds another."""
+    kinds = [getattr(errors, name) for name in errors.__all__]
+    assert len(kinds) >= 10
+    assert [kind.__name__ for kind in kinds if not issubclass(kind, FiveBarPinError)] == []
 
 
 def test_a_frame_name_shared_by_link_and_joint_means_the_link():
@@ -244,3 +247,40 @@ def test_a_mesh_may_be_mirrored_but_not_flattened() -> None:
     assert fb.Visual("link", "mesh", (1.0, -1.0, 1.0), mesh="a.stl").size[1] == -1.0
     with pytest.raises(InvalidInputError, match="must be scales other than zero"):
         fb.Visual("link", "mesh", (1.0, 0.0, 1.0), mesh="a.stl")
+
+
+@pytest.mark.parametrize("axis", [(1e-10, 0.0, 0.0), (0.0, -1e-200, 0.0)])
+def test_an_axis_of_next_to_nothing_is_none(axis):
+    with pytest.raises(InvalidInputError, match=r"closure axis .* must not be zero"):
+        fb.Closure(("a", "b"), "revolute", axis)
+
+
+@pytest.mark.parametrize("size", [1e-8, 1.0, 1e200])
+def test_the_size_of_an_axis_does_not_matter(size):
+    axis = fb.Closure(("a", "b"), "revolute", np.array([3.0, 0.0, -4.0]) * size).axis
+    np.testing.assert_allclose(axis, [0.6, 0.0, -0.8], rtol=0.0, atol=1e-15)
+
+
+def test_frames_that_both_stand_on_the_ground_close_nothing():
+    model = arms()
+    point(model, 0, "here", at(1.0))
+    with pytest.raises(InvalidInputError, match=r"joins two frames of one body \(universe\)"):
+        fb.ClosedChain(model, (fb.Closure(("universe", "here")),), ())
+
+
+@pytest.mark.parametrize("away", [(100.0, 0.0, 0.0), (-3.0, 2.0, 5.0)])
+def test_the_length_of_a_mechanism_does_not_depend_on_where_it_stands(away):
+    assert five_bar(base=at(*away)).length == pytest.approx(five_bar().length, rel=1e-12)
+    assert double_four_bar().length == pytest.approx(9.0 / 8.0, rel=1e-12)  # eight spans; the first joint is none
+
+
+def test_a_body_without_mass_keeps_its_moments_of_inertia_and_has_no_first_moment():
+    chain = four_bar()
+    pi = np.array(chain.inertial_parameters)
+    pi[1] = [0.0, 0.0, 0.0, 0.0, 0.5, 0.01, 0.6, 0.02, 0.03, 0.7]
+    np.testing.assert_array_equal(chain.with_inertial_parameters(pi).inertial_parameters, pi)
+    for k in (1, 2, 3):
+        wrong = pi.copy()
+        wrong[1, k] = 0.1
+        with pytest.raises(InvalidInputError, match=r"first moment of the body of joint coupler .* must be zero"):
+            chain.with_inertial_parameters(wrong)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 
+import families
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -21,6 +22,7 @@ from mechanisms import (
     point,
     rscr,
     rssr,
+    side_by_side,
     slider_crank,
     welded_four_bar,
 )
@@ -454,3 +456,115 @@ def test_blocks_decompose_as_the_whole_does(shape: tuple[int, int]) -> None:
     np.testing.assert_allclose(U @ U.T, np.eye(shape[0]), rtol=0, atol=1e-13)
     np.testing.assert_allclose(Vt @ Vt.T, np.eye(shape[1]), rtol=0, atol=1e-13)
     np.testing.assert_allclose((U[:, : s.size] * s) @ Vt[: s.size], A, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("away", [1e-3, 1e-6, 1e-8])
+def test_next_to_a_singular_configuration_the_rank_is_whole(away):
+    """The flat parallelogram has lost a row; whatever lies beside it has not."""
+    chain = parallelogram()
+    beside, flat = (diagnose(chain, [x, -x, x]) for x in (away, 0.0))
+    assert (beside.rank, beside.mobility, beside.is_singular) == (2, 1, False)
+    assert 0.1 * away < beside.singular_values[1] < 10.0 * away
+    assert (flat.rank, flat.mobility, flat.is_singular) == (1, 2, True)
+
+
+def resized(chain: fb.ClosedChain, size: float) -> fb.ClosedChain:
+    """Return the chain with all its lengths times a size."""
+    model = chain.model.copy()
+    for j in range(1, model.njoints):
+        M, inertia = model.jointPlacements[j], model.inertias[j]
+        model.jointPlacements[j] = pin.SE3(M.rotation, size * M.translation)
+        model.inertias[j] = pin.Inertia(inertia.mass, size * inertia.lever, size**2 * inertia.inertia)
+    for frame in model.frames:
+        frame.placement = pin.SE3(frame.placement.rotation, size * frame.placement.translation)
+    return fb.ClosedChain(model, chain.closures, chain.actuated)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_distances_to_singularities_do_not_depend_on_the_size_of_slides(size):
+    """A slide counts in lengths of the mechanism as an angle counts in radians."""
+    for chain, q in ((slider_crank(), fb.assemble(slider_crank(), [0.8])), rscr()):
+        slides = np.array([j.nv == 1 and j.shortname().startswith("JointModelP") for j in list(chain.model.joints)[1:]])
+        place = [j.idx_q for j, slide in zip(list(chain.model.joints)[1:], slides, strict=True) if slide]
+        large = np.array(q)
+        large[place] *= size
+        one, other = diagnose(chain, q), diagnose(resized(chain, size), large)
+        np.testing.assert_allclose(other.singular_values, one.singular_values, rtol=1e-9, atol=1e-12)
+        assert other.sigma == pytest.approx(one.sigma, rel=1e-9)
+        assert other.amplification == pytest.approx(one.amplification, rel=1e-9)
+
+
+@pytest.mark.parametrize("off", [1e-3, 1e-6, 1e-8])
+def test_a_configuration_that_is_all_but_closed_is_called_open(off):
+    chain = five_bar()
+    q, elbow = fb.assemble(chain, [2.0, 1.0]), np.array([0.0, 1.0, 0.0, 0.0])
+    assert "loops are open at the given configuration" in texts(diagnose(chain, q + off * elbow), "error")
+    assert diagnose(chain, q + 1e-11 * elbow).ok
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_limit_on_either_side_is_told_with_its_joint(side):
+    """The joint is the one whose coordinate it is, behind joints of several coordinates too."""
+    chain, q = rscr()
+    model = chain.model.copy()
+    limit = getattr(model, f"{side}PositionLimit")
+    limit[model.joints[model.getJointId("turn")].idx_q] = 0.7 + (0.1 if side == "lower" else -0.1)
+    limited = fb.ClosedChain(model, chain.closures, chain.actuated)
+    assert "outside the limits of turn" in texts(diagnose(limited, q), "warning")
+    assert "outside the limits" not in texts(diagnose(chain, q), "warning")
+
+
+def test_cosine_and_sine_of_any_size_are_the_same_angle():
+    chain = four_bar(joint=pin.JointModelRUBZ)
+    q = fb.assemble(chain, [0.8])
+    one, other = diagnose(chain, q), diagnose(chain, 3.0 * q)
+    assert other.ok
+    np.testing.assert_allclose(other.q, one.q, rtol=0.0, atol=1e-12)
+
+
+def test_a_motion_of_negative_energy_is_told_from_one_of_none():
+    less = np.tile([0.01, 0.0, 0.0, 0.0, -1.0, 0.0, -1.0, 0.0, 0.0, -1.0], (4, 1))
+    assert "can move with negative kinetic energy" in texts(
+        diagnose(five_bar().with_inertial_parameters(less)), "error"
+    )
+
+
+def test_a_slide_out_of_the_plane_is_no_planar_motion():
+    """Then a flat body is missed: it must be one in space."""
+    model = pin.Model()
+    arm = add(model, 0, pin.JointModelRZ(), at(), "arm", body(1))
+    add(model, arm, pin.JointModelPZ(), at(0.5), "lift", pin.Inertia(1.0, np.zeros(3), np.diag([0.0, 0.0, 0.3])))
+    d = diagnose(fb.ClosedChain(model, (), ("arm", "lift")))
+    assert "no body has the inertia of joint lift" in texts(d, "error")
+    assert "does not feel it" not in str(d)
+
+
+def test_a_dozen_sets_are_listed_and_four_of_them_printed():
+    d = diagnose(families.planar_rrr(3, 0, home=True))
+    assert len(d.actuated_sets) == 12
+    printed = str(d).splitlines()
+    first = next(k for k, line in enumerate(printed) if "could drive" in line)
+    assert "determinate reactions" in printed[first + 4]
+
+
+def test_passive_speeds_are_without_bound_at_the_singularity():
+    chain = parallelogram()
+    flat, beside = diagnose(chain, np.zeros(3)), diagnose(chain, [0.01, -0.01, 0.01])
+    assert (flat.sigma, flat.amplification) == (0.0, np.inf)
+    assert 0.9 < beside.amplification < 1.1  # coupler and rocker turn as fast as the crank
+
+
+def test_only_sets_that_determine_the_motion_are_listed():
+    """Two four-bars that share nothing need a motor each, on any of their joints: nine pairs of fifteen."""
+    d = diagnose(side_by_side((0.4, 1.1, 0.9, 1.0), (0.4, 1.1, 0.9, 1.0), tilt=TILTED))
+    assert len(d.actuated_sets) == 9
+    assert all({name[-1] for name in option.joints} == {"0", "1"} for option in d.actuated_sets)
+    assert min(option.sigma for option in d.actuated_sets) > 1e-3
+
+
+def test_of_many_joints_one_good_set_is_looked_for():
+    """Six of eighteen joints can be chosen in 18564 ways: one set is built up, each joint the best of what is left."""
+    d = diagnose(side_by_side(*[(0.1 + 0.1 * k, 1.1, 0.9, 1.0) for k in range(6)]))
+    (only,) = d.actuated_sets
+    assert {name[-1] for name in only.joints} == set("012345")
+    assert only.sigma > 0.1

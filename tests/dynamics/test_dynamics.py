@@ -345,6 +345,20 @@ def test_wrench_on_the_ground_only_reaches_the_ground():
     assert loaded.momentum_residual() <= 1e-12
 
 
+def test_a_force_on_a_frame_in_the_ground_has_its_lever():
+    """The moment about the origin is p x F + M for a frame of the ground at p, in the loads and in their own check."""
+    model = slider_crank().model.copy()
+    place = np.array([0.3, -0.8, 0.4])
+    model.addFrame(pin.Frame("hook", 0, 0, pin.SE3(np.eye(3), place), pin.FrameType.OP_FRAME))
+    chain = fb.ClosedChain(model, slider_crank().closures, ("crank",))
+    trajectory, pull = fb.drive(chain, swinging(0.9)), np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
+    bare = fb.inverse_dynamics(chain, trajectory)
+    loaded = fb.inverse_dynamics(chain, trajectory, external={"hook": pull})
+    wanted = np.tile(np.cross(place, pull[:3]) + pull[3:], (40, 1))
+    np.testing.assert_allclose(loaded.frame_moment - bare.frame_moment, wanted, rtol=0.0, atol=1e-11)
+    assert loaded.momentum_residual() <= 1e-12
+
+
 def test_damping_friction_and_armature_do_what_their_names_say():
     plain, motion = five_bar(gravity=(0.0, 0.0, 0.0)), swinging(2.0, 1.0)
     trajectory = fb.drive(plain, motion)
@@ -508,3 +522,93 @@ def test_arguments_are_checked():
     for wrong in (np.zeros(5), np.full(6, np.inf), ["a"] * 6):
         with pytest.raises(InvalidInputError, match=r"external\['tip_left'\]"):
             fb.inverse_dynamics(chain, trajectory, external={"tip_left": wrong})
+
+
+@pytest.mark.parametrize("sense", [-1.0, 0.0, 1.0])
+def test_dry_friction_is_against_the_motion_and_nothing_at_rest(sense):
+    """f sign(v) in both directions of dynamics: a joint at rest is not pushed."""
+    chain, q = four_bar(), fb.assemble(four_bar(), [0.9])
+    model = chain.model.copy()
+    model.upperDryFrictionLimit = np.array([0.3, 0.5, 0.7])
+    rough = fb.ClosedChain(model, chain.closures, chain.actuated)
+    motion = Motion([0.0], [[0.9]], [[2.0 * sense]], [[1.0]])
+    smooth = fb.inverse_dynamics(chain, fb.drive(chain, motion, q))
+    loads = fb.inverse_dynamics(rough, fb.drive(rough, motion, q))
+    v, N = loads.trajectory.v[0], loads.trajectory.N[0, :, 0]
+    taken = np.array([0.3, 0.5, 0.7]) @ (np.sign(v) * N)
+    assert (np.abs(v) > 0.1).all() == (sense != 0.0)
+    np.testing.assert_allclose(loads.torque - smooth.torque, [[taken]], rtol=0.0, atol=1e-13)
+    tau = smooth.torque[0]
+    plain, held = fb.forward_dynamics(chain, q, v, tau), fb.forward_dynamics(rough, q, v, tau + taken)
+    np.testing.assert_allclose(held, plain, rtol=0.0, atol=1e-10)
+
+
+def test_what_the_frame_carries_beside_shaking_is_told_where_there_is_any():
+    """Weight needs mass and gravity; a force from outside needs neither."""
+    chain = four_bar().with_gravity([0.0, -9.81, 0.0])
+    moved = fb.drive(chain, swinging(0.9))
+    floating, massless = chain.with_gravity(np.zeros(3)), chain.with_inertial_parameters(np.zeros((3, 10)))
+    push = {"rocker_end": np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])}
+    loaded = [fb.inverse_dynamics(c, moved).loaded for c in (chain, floating, massless)]
+    assert loaded == [True, False, False]
+    assert fb.inverse_dynamics(floating, moved, external=push).loaded
+    assert not fb.inverse_dynamics(floating, moved, external={"rocker_end": np.zeros(6)}).loaded
+    assert "frame_moment" in repr(fb.inverse_dynamics(floating, moved, external=push))
+    assert "frame_moment" not in repr(fb.inverse_dynamics(floating, moved))
+
+
+def alone(what: str) -> fb.Loads:
+    """Return the loads of a four-bar on which one thing acts and nothing else, at rest but for losses."""
+    model = four_bar().model.copy()
+    model.gravity.linear = np.array([0.0, -9.81, 0.0]) if what == "weight" else np.zeros(3)
+    if what == "friction":
+        model.upperDryFrictionLimit = np.array([0.3, 0.5, 0.7])
+    if what == "damping":
+        model.damping = np.array([0.3, 0.5, 0.7])
+    if what == "armature":
+        model.armature = np.array([0.3, 0.5, 0.7])
+    springs = [fb.JointSpring("coupler", 5.0, 0.0)] if what == "spring" else []
+    chain = fb.ClosedChain(model, four_bar().closures, ("crank",), springs=springs)
+    if what != "weight":
+        chain = chain.with_inertial_parameters(np.zeros((3, 10)))
+    moving = float(what in ("friction", "damping"))
+    motion = Motion([0.0], [[0.9]], [[moving]], [[float(what == "armature")]])
+    push = {"rocker_end": np.array([1.0, -2.0, 0.0, 0.0, 0.0, 0.4])} if what == "push" else {}
+    return fb.inverse_dynamics(chain, fb.drive(chain, motion), about=(0.2, -0.4, 0.3), external=push)
+
+
+@pytest.mark.parametrize("what", ["weight", "push", "spring", "friction", "damping", "armature"])
+def test_the_scale_of_a_load_counts_each_thing_that_acts_alone(what):
+    """With one thing acting the sum of sizes is no less than what it causes: nothing that acts is left out."""
+    x = alone(what)
+    assert x.peak("torque") > 0.1
+    for name in ("torque", "shaking_force", "shaking_moment", "frame_force", "frame_moment"):
+        assert x.scale(name) >= x.peak(name) * (1.0 - 1e-12), name
+    felt = x.peak("frame_force") > 0.1, x.peak("frame_moment") > 0.1
+    assert felt == ((True, True) if what in ("weight", "push") else (False, False))
+    assert x.peak("shaking_force") == x.peak("shaking_moment") == 0.0
+
+
+@pytest.mark.parametrize("tilt", [1e-6, 1e-3, 0.1])
+def test_what_a_slight_tilt_leaves_open_is_open(tilt):
+    """The force across the plane is not determinate: in world axes its share makes another component so, however small.
+
+    In the joint's own axes both components in the plane stay known.
+    """
+    chain = four_bar(base=pin.SE3(pin.rpy.rpyToMatrix(tilt, 0.0, 0.0), np.zeros(3)))
+    loads = fb.inverse_dynamics(chain, fb.drive(chain, swinging(0.9)))
+    known = np.isfinite(loads.joint_reactions[0, :, :3])
+    np.testing.assert_array_equal(known, np.tile([True, False, False], (3, 1)))
+    known = np.isfinite(loads.joint_reactions_local[0, :, :3])
+    np.testing.assert_array_equal(known, np.tile([True, True, False], (3, 1)))
+
+
+def test_torques_that_no_closure_forces_explain_show_as_a_mismatch():
+    """With a complement that is none, what the closures carry does not balance the joints."""
+    chain = five_bar()
+    moved = fb.drive(chain, swinging(2.0, 1.0))
+    right = fb.inverse_dynamics(chain, moved)
+    wrong = fb.inverse_dynamics(chain, replace(moved, N=1.1 * moved.N))
+    size = np.abs(right.torque).max()
+    assert right.reactions.mismatch < 1e-12 * size
+    assert wrong.reactions.mismatch > 1e-2 * size

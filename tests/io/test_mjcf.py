@@ -169,14 +169,15 @@ def test_a_free_joint_and_its_keyframe_come_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("<option", "<tendon><spatial/></tendon><option", "tendons are not supported"),
+        ("<option", '<tendon><fixed stiffness="3"/></tendon><option', "stiffness of a tendon is not supported"),
         (
             '<connect name="pin"',
-            '<joint joint1="ja" joint2="jb"/><connect name="pin"',
-            "couples the coordinates of joints, not two frames; only connect and weld",
+            '<joint joint1="ja" joint2="jb" polycoef="0 1 0.5 0 0"/><connect name="pin"',
+            "is not linear; only a0 + a1 x is supported",
         ),
         ("<option", '<include file="other.xml"/><option', "merge them"),
-        ('name="jb"', 'name="jb" stiffness="3"', "stiffness is not supported"),
+        ('name="jc"', 'name="jc" stiffness="3"', "stiffness of a ball joint is not supported"),
+        ('name="jb"', 'name="jb" springdamper="1 1"', "springdamper is not supported"),
         ('name="jb"', 'name="jb" ref="0.1"', "ref is not supported"),
         ('name="jb"', 'name="jb" dampig="3"', "Did you mean 'damping'"),
         ('name="jb"', 'name="jb" class="hard"', "Unknown default class 'hard'"),
@@ -203,6 +204,12 @@ def test_a_free_joint_and_its_keyframe_come_back(tmp_path: Path) -> None:
         ("<option", '<option viscosity="1"/><option', "forces of a fluid"),
         ("<compiler ", '<compiler settotalmass="3" ', "settotalmass is not supported"),
         ("<compiler ", '<compiler angle="grad" ', "Unknown angle unit 'grad'"),
+        ("<compiler ", '<compiler eulerseq="xy" ', "eulerseq = 'xy' must be three of x, y, z"),
+        ("<compiler ", '<compiler eulerseq="xyzx" ', "eulerseq = 'xyzx' must be three of x, y, z"),
+        ("<compiler ", '<compiler eulerseq="xyw" ', "eulerseq = 'xyw' must be three of x, y, z"),
+        ('size="0.1 0.2 0.3" axis', 'size="0.1 0.2 0.3 0.4" axis', "must be 3 number(s)"),
+        ('size="0.1 0.2 0.3" axis', 'size="0.1 0.2" axis', "must be 3 number(s)"),
+        ('size="0.1 0.2 0.3" axis', 'size="0.1 0.0 0.3" axis', "must be positive [m]"),
         ("<worldbody>", "<worldbdy/><worldbody>", "Did you mean 'worldbody'"),
     ],
 )
@@ -229,3 +236,20 @@ def test_a_joint_that_mjcf_lacks_is_refused_when_writing(tmp_path: Path) -> None
     with pytest.raises(InvalidInputError, match="formats="):
         io.save(ClosedChain(model, (), ()), tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_orientation_of_an_element_replaces_the_one_of_its_class(tmp_path: Path) -> None:
+    """Whichever of the five ways either of them is stated in."""
+    (tmp_path / "m.xml").write_text(
+        '<mujoco><default><geom euler="0 0 90" type="box" size="0.1 0.2 0.3"/></default><worldbody><body name="a">'
+        '<joint name="ja" type="hinge" axis="0 1 0"/><geom quat="0.9238795325112867 0.3826834323650898 0 0"/></body>'
+        '<body name="b"><joint name="jb" type="hinge" axis="0 1 0"/><geom/></body></worldbody></mujoco>'
+    )
+    chain = io.load(tmp_path / "m.xml")
+    mass = 1000.0 * 8.0 * 0.1 * 0.2 * 0.3
+    own = mass / 3.0 * np.diag([0.2**2 + 0.3**2, 0.1**2 + 0.3**2, 0.1**2 + 0.2**2])
+    for k, turn in (
+        (1, pin.exp3(np.array([0.25 * np.pi, 0.0, 0.0]))),
+        (2, pin.exp3(np.array([0.0, 0.0, 0.5 * np.pi]))),
+    ):
+        np.testing.assert_allclose(chain.model.inertias[k].inertia, turn @ own @ turn.T, rtol=0.0, atol=1e-12)

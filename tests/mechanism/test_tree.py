@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import add, at, body, double_four_bar, five_bar, rscr, slider_crank
 
+import fivebar_pin as fb
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import Bodies, accelerations, body_rates, total_centre
 from fivebar_pin.mechanism.tree import Tree, motion_cross
@@ -176,3 +180,21 @@ def test_support_lists_the_joints_that_move_a_body(chain):
         for i in list(model.supports[j])[1:]:
             moving |= set(range(model.idx_vs[i], model.idx_vs[i] + model.joints[i].nv))
         assert set(np.flatnonzero(tree.support[j])) == moving
+
+
+def test_threads_do_not_share_a_workspace(monkeypatch):
+    """All have computed before any reads its result: the worst order that the interpreter may choose."""
+    chain = five_bar()
+    Q = np.random.default_rng(8).uniform(-np.pi, np.pi, (4, chain.nq))
+    alone = [fb.closure_residual(chain, q) for q in Q]
+    barrier, compute = threading.Barrier(4, timeout=30.0), pin.computeJointJacobians
+
+    def compute_and_wait(*args):
+        J = np.array(compute(*args))
+        barrier.wait()
+        return J
+
+    monkeypatch.setattr(pin, "computeJointJacobians", compute_and_wait)
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda q: fb.closure_residual(chain, q), Q))
+    np.testing.assert_array_equal(together, alone)

@@ -59,6 +59,12 @@ def test_spline_passes_through_its_values():
     np.testing.assert_allclose(m.q, VALUES, rtol=0.0, atol=1e-13)
 
 
+def test_a_cubic_move_brakes_to_its_very_end():
+    """Its acceleration does not vanish there, -6 h / T^2, and is gone right after."""
+    m = laws.polynomial([0.0, 1.0, 2.0, 2.0 + 1e-9], 1.0, 4.0, degree=3, duration=2.0)
+    np.testing.assert_allclose(m.a[:, 0], [4.5, 0.0, -4.5, 0.0], rtol=0.0, atol=1e-14)
+
+
 def test_periodic_spline_closes_smoothly():
     m = laws.spline(KNOTS[[0, -1]], KNOTS, CYCLE, periodic=True)
     for x in (m.q, m.v, m.a):
@@ -194,15 +200,30 @@ def test_headers_with_units_are_read_and_columns_are_taken_by_name(tmp_path, hea
     np.testing.assert_array_equal(laws.from_file(tmp_path / "m.csv", ("x", "y")).q, both.q)
     with pytest.raises(FileFormatError, match="missing q_three, v_three, a_three; coordinates there: one, two"):
         laws.from_file(tmp_path / "m.csv", ("one", "three"))
+    with pytest.raises(FileFormatError, match="missing q_x; coordinates there: one, two"):
+        laws.from_file(tmp_path / "m.csv", ("x",))  # none of these names, and not as many
 
 
 def test_other_units_are_not_taken_for_ours(tmp_path):
-    (tmp_path / "m.csv").write_text("t [s],q x [deg],v x [deg/s],a x [deg/s2]\n0,1,2,3\n")
-    with pytest.raises(FileFormatError, match="unit must be rad or m or -, convert it first"):
-        laws.from_file(tmp_path / "m.csv")
+    for head, known in (
+        ("t [ms],q x [rad],v x [rad/s],a x [rad/s2]", "s"),
+        ("t [s],q x [deg],v x [rad/s],a x [rad/s2]", "rad or m or -"),
+        ("t [s],q x [rad],v x [rpm],a x [rad/s2]", "rad/s or m/s"),
+        ("t [s],q x [rad],v x [rad/s],a x [deg/s2]", "rad/s2 or m/s2"),
+    ):
+        (tmp_path / "m.csv").write_text(head + "\n0,1,2,3\n")
+        with pytest.raises(FileFormatError, match=f"unit must be {known}.*, convert it first"):
+            laws.from_file(tmp_path / "m.csv")
 
 
 Z = np.zeros((3, 1))
+
+
+def all_but_closed() -> np.ndarray:
+    """Return the values of a cycle that misses its start by a millionth."""
+    values = np.array(CYCLE, dtype=float)
+    values[-1] += 1e-6
+    return values
 
 
 @pytest.mark.parametrize(
@@ -223,6 +244,7 @@ Z = np.zeros((3, 1))
         (lambda: laws.spline(T, KNOTS[::-1], VALUES), "strictly increasing"),
         (lambda: laws.spline(T + 1.0, KNOTS, VALUES), r"t = .* must lie within \[0.0, 2.0\]"),
         (lambda: laws.spline(T, KNOTS, VALUES, periodic=True), r"values\[-1\] .* must equal values\[0\]"),
+        (lambda: laws.spline(T, KNOTS, all_but_closed(), periodic=True), r"values\[-1\] .* must equal values\[0\]"),
         (lambda: laws.spline(T, KNOTS, VALUES[:4]), r"shape of values"),
         (lambda: laws.constant(T, np.nan), "value = nan but must be finite"),
         (lambda: laws.constant(T, "high"), "value = 'high' but must be one number"),

@@ -99,6 +99,8 @@ def test_case_I_optimum_is_the_exact_one():
     assert OPTIMUM.curvature > 0.0
     assert np.abs(OPTIMUM.residuals).max() <= 1e-15
     assert OPTIMUM.minima[0] == OPTIMUM.objective
+    assert OPTIMUM.reached > len(OPTIMUM.minima)  # many starts end at one
+    assert (np.diff(OPTIMUM.minima) > 1e-9).all()
     assert OPTIMUM.reached > 1
     for field in ("lengths", "masses", "inertias"):
         np.testing.assert_array_equal(getattr(OPTIMUM.linkage, field), getattr(CASE_I, field))
@@ -333,3 +335,10 @@ def test_audit_takes_another_motion_and_mode():
     assert slow.printed.shaking_force == pytest.approx(fast.printed.shaking_force / 4)
     assert slow.printed.torque_4 == pytest.approx(fast.printed.torque_4 / 4)
     assert isinstance(paper.default_motion(), Motion)
+
+
+@pytest.mark.parametrize("bounds", [(0.01, 0.05), (0.2, 1.0)])
+def test_masses_that_cannot_add_up_to_the_total_are_infeasible(bounds):
+    """Four links of at most 50 g are never 0.4 kg, four of at least 200 g are more."""
+    with pytest.raises(InfeasibleError, match=r"never to the total mass of 0\.4 kg"):
+        paper.balance_masses(paper.table_1("I", "balanced"), mass_bounds=bounds, total_mass=0.4)

@@ -12,6 +12,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, Immutable, cross, skew
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import accelerations
+from fivebar_pin.dynamics.elastic import spring_forces
 from fivebar_pin.dynamics.losses import friction_torque
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.tree import Poses
@@ -127,5 +128,9 @@ def tree_torque(state: BodyMotion, wrench: Array) -> Array:
 
 
 def torque_offset(chain: ClosedChain, trajectory: Trajectory) -> Array:
-    """Torque of armature, damping and dry friction in the tree (n, nv)."""
-    return np.asarray(np.array(chain.model.armature) * trajectory.a + friction_torque(chain, trajectory.v))
+    """Torque of armature, damping, dry friction and springs in the tree (n, nv)."""
+    offset = np.array(chain.model.armature) * trajectory.a + friction_torque(chain, trajectory.v)
+    if chain.springs:
+        loops, q = loops_of(chain), trajectory.q
+        offset = offset - spring_forces(chain, loops, q, trajectory.v, loops.tree.poses(q)).force
+    return np.asarray(offset)

@@ -11,8 +11,9 @@ import numpy as np
 from fivebar_pin._arrays import Array, skew
 from fivebar_pin.balancing.regressors.body_motion import gravity_of, motion_of_bodies, torque_offset, tree_torque
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures import closure as closure_rows
-from fivebar_pin.mechanism.loops import RANK_TOLERANCE, Loops, loops_of
+from fivebar_pin.dynamics.elastic import body_wrenches
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["marked", "reaction_matrices"]
@@ -28,17 +29,19 @@ def reaction_matrices(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array
     joint = np.zeros((n, nb, 6, tau.shape[2]))
     for b in range(nb):
         joint[:, b, :, 10 * b : 10 * (b + 1)] = wrench[:, b]
+    if chain.springs:
+        joint[..., -1] -= body_wrenches(chain, loops, trajectory.v, state.poses)
     closure = np.zeros((n, len(chain.closures), 6, tau.shape[2]))
     if loops.m:
         pairs = loops.pairs(state.poses)
         multipliers = np.matmul(_multiplier_map(loops, loops.jacobian(state.poses, pairs)), tau)
         for k, (anchored, pair) in enumerate(zip(loops.anchored, pairs, strict=True)):
-            T = closure_rows.selector(anchored.closure, pair)
+            T = anchored.selector(pair)
             on_second = np.matmul(np.swapaxes(T, 1, 2), multipliers[:, anchored.rows])
             for j, sign in zip(anchored.joints, (1.0, -1.0), strict=True):
                 if j:
                     joint[:, j - 1] += sign * on_second
-            closure[:, k] = _at(on_second, pair.p2)
+            closure[:, k] = _at(on_second, anchored.place(pair)[0])
     for j in range(nb, 0, -1):
         parent = int(chain.model.parents[j])
         if parent:
@@ -48,10 +51,8 @@ def reaction_matrices(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array
 
 def _multiplier_map(loops: Loops, J: Array) -> Array:
     """Return X (n, m, nv): closure forces of least norm = X @ unbalanced torque."""
-    U, s, Vt = np.linalg.svd(J * loops.row_scale[:, None] * loops.column_scale, full_matrices=False)
-    rank = int(np.min(np.sum(s > RANK_TOLERANCE * np.maximum(s[:, :1], 1e-300), axis=1)))
-    inverse = np.where(np.arange(s.shape[1]) < rank, 1.0 / np.where(s > 0.0, s, 1.0), 0.0)
-    return np.asarray(np.matmul(U * inverse[:, None, :], Vt) * loops.row_scale[:, None] * loops.column_scale)
+    decomposed = Decomposed.of(loops.scaled(J))
+    return loops.scaled(decomposed.carrier(decomposed.rank))
 
 
 def _at(wrench: Array, point: Array) -> Array:

@@ -9,8 +9,8 @@ acceleration alpha, and parameters m, h = m c, I about the joint origin, all sum
     E_kin = (u . p_lin + w . l_o) / 2           E_pot = -g . (m p + R h)
 
 Moments move to another point by the lever times the force. With S_j the joint columns that carry the body and N the
-complement, tau = sum N^T S_j^T [f; n]; the frame is shaken by -sum f_0 and carries -sum f. Armature, damping and dry
-friction do not depend on the parameters: they make the offset.
+complement, tau = sum N^T S_j^T [f; n]; the frame is shaken by -sum f_0 and carries -sum f. Armature, damping, dry
+friction and springs do not depend on the parameters: they make the offset.
 """
 
 from __future__ import annotations
@@ -82,7 +82,8 @@ def regressor(
         chain: the mechanism; its present inertial parameters play no part.
         trajectory: of this chain.
         quantity: one of `QUANTITIES`: linear_momentum, angular_momentum, shaking_force, shaking_moment, frame_force,
-            frame_moment (3 rows each), torque, gravity_torque (na rows), potential_energy, kinetic_energy (1 row),
+            frame_moment (3 rows each), torque, gravity_torque (na rows, the weight's alone: springs are in torque),
+            potential_energy, kinetic_energy (1 row),
             joint_reactions (6 rows per body), closure_reactions (6 rows per closure). Signs, axes and meaning are
             those of `inverse_dynamics`: the rotors (armature) are in the torque alone.
         about: point that angular momentum, shaking and frame moment refer to (3,) [m], world.

@@ -1,0 +1,128 @@
+"""Springs in MJCF: spatial tendons between two sites, and the springs of hinges and slides.
+
+MuJoCo's tendon pulls with k (L - l) + c dL/dt and its joint with -k (q - rest) - b dq/dt: the laws of `Spring` and
+`JointSpring`. It has one damper for a joint: that of a joint's spring is read back as the joint's own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin.chain import ClosedChain, frames_by_name
+from fivebar_pin.errors import FiveBarPinError, InvalidInputError, UnknownNameError
+from fivebar_pin.io._mjcf_reader import MjcfReader
+from fivebar_pin.io._mjcf_tree import BodyTree
+from fivebar_pin.io._urdf_text import numbers
+from fivebar_pin.springs import JointSpring, Spring
+
+__all__ = ["joint_springs_to_write", "tendon_lines", "tendon_springs"]
+
+_AUTOMATIC = -1.0
+"""MuJoCo's springlength for the length where the springs of all joints are relaxed."""
+_URDF_ONLY = "Save it as URDF only: formats=('urdf',)."
+
+
+def tendon_springs(
+    reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree, model: pin.Model
+) -> tuple[Spring, ...]:
+    """Return the springs that the tendons of a file are; tendons that do nothing are passed over."""
+    springs = []
+    for k, element in enumerate(root.findall("tendon/*")):
+        where = f"{element.tag} {element.get('name', str(k))!r}"
+        if element.tag == "fixed":
+            continue  # it couples joints, see `_mjcf_equality`
+        if element.tag != "spatial":
+            raise reader.fail(where, str(UnknownNameError("tendon", element.tag, ("fixed", "spatial"))))
+        full = reader.with_defaults(ElementTree.Element("tendon", element.attrib), None)
+        _check_spring_alone(reader, full, where)
+        (stiffness,), (damping,) = (reader.numbers(full, w, 1, where, [0.0]) for w in ("stiffness", "damping"))
+        if not stiffness and not damping:
+            continue
+        ends = _sites(reader, element, bodies, where)
+        try:
+            stated = _stated_length(reader, full, where)
+            length = _relaxed_length(model, bodies.rests, ends) if stated == _AUTOMATIC else stated
+            springs.append(Spring(*ends, stiffness, length, damping))
+        except FiveBarPinError as error:
+            raise reader.fail(where, str(error)) from error
+    return tuple(springs)
+
+
+def joint_springs_to_write(chain: ClosedChain) -> dict[str, JointSpring]:
+    """Return the springs on joints by joint.
+
+    Raises:
+        InvalidInputError: two on one joint, or one on a joint that does not count its turns, which MJCF cannot say.
+    """
+    springs = [s for s in chain.springs if isinstance(s, JointSpring)]
+    for joint, count in Counter(s.joint for s in springs).items():
+        if count > 1:
+            raise InvalidInputError(f"springs on joint {joint}", count, "must be at most one in MJCF", _URDF_ONLY)
+        model: pin.Model = chain.model
+        if model.nqs[model.getJointId(joint)] == 2:
+            rule = "has no word in MJCF, whose hinges count their turns"
+            raise InvalidInputError(f"spring on joint {joint}", "continuous", rule, _URDF_ONLY)
+    return {s.joint: s for s in springs}
+
+
+def tendon_lines(chain: ClosedChain, site: Callable[[str], str]) -> list[str]:
+    """Return the tendons that the chain's springs between frames are; `site` makes a site of a frame."""
+    lines = []
+    for spring in chain.springs:
+        if isinstance(spring, Spring):
+            words = f'stiffness="{numbers([spring.stiffness])}" springlength="{numbers([spring.length])}"'
+            if spring.damping:
+                words += f' damping="{numbers([spring.damping])}"'
+            ends = "".join(f"<site site={quoteattr(site(f))}/>" for f in (spring.frame1, spring.frame2))
+            lines.append(f"    <spatial {words}>{ends}</spatial>")
+    return lines
+
+
+def _check_spring_alone(reader: MjcfReader, full: ElementTree.Element, where: str) -> None:
+    """Refuse whatever else than a spring and a damper acts in a tendon."""
+    for limited, bounds in (("limited", "range"), ("actuatorfrclimited", "actuatorfrcrange")):
+        stated = reader.flag(full, limited, where, "auto")
+        if stated == "true" or (stated == "auto" and bounds in full.attrib):
+            raise reader.fail(where, f"{bounds}: limits of tendons are not supported; remove it")
+    for word in ("frictionloss", "armature"):
+        if reader.numbers(full, word, 1, where, [0.0])[0]:
+            raise reader.fail(where, f"{word} of tendons is not supported; remove it")
+
+
+def _sites(reader: MjcfReader, element: ElementTree.Element, bodies: BodyTree, where: str) -> tuple[str, str]:
+    """Return the frames of the two sites that a tendon joins."""
+    for child in element:
+        if child.tag != "site":
+            raise reader.fail(where, f"goes over a <{child.tag}>; a spring joins two sites in a straight line")
+    if len(element) != 2:
+        raise reader.fail(where, f"goes over {len(element)} sites; a spring joins two")
+    names = [reader.text(child, "site", where) for child in element]
+    for name in names:
+        if name not in bodies.sites:
+            raise reader.fail(where, str(UnknownNameError("site", name, bodies.sites)))
+    return bodies.sites[names[0]], bodies.sites[names[1]]
+
+
+def _stated_length(reader: MjcfReader, full: ElementTree.Element, where: str) -> float:
+    words = full.get("springlength", str(_AUTOMATIC)).split()
+    values = [reader.number(word, "springlength", where) for word in words]
+    if len(values) not in (1, 2) or values[0] != values[-1]:
+        raise reader.fail(where, f"springlength = {' '.join(words)!r}: a dead band is not supported; state one length")
+    return values[0]
+
+
+def _relaxed_length(model: pin.Model, rests: dict[str, float], ends: tuple[str, str]) -> float:
+    """Return the distance of two frames where hinges and slides are at rest, other joints as the file places them."""
+    dv, data = np.zeros(model.nv), model.createData()
+    for joint, rest in rests.items():
+        dv[model.idx_vs[model.getJointId(joint)]] = rest
+    pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), dv))
+    named = frames_by_name(model)
+    first, second = (data.oMf[model.getFrameId(end, named[end].type)].translation for end in ends)
+    return float(np.linalg.norm(second - first))

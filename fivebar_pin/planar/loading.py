@@ -1,0 +1,63 @@
+"""Loading a mechanism from any file: a linkage in its own words, or whatever `fivebar_pin.io.load` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy.typing as npt
+
+from fivebar_pin import io
+from fivebar_pin._files import MAX_BYTES, as_path
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.closures import Closure
+from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError
+from fivebar_pin.planar._reading import is_linkage_file
+from fivebar_pin.planar._reading import load as load_linkage
+
+__all__ = ["load"]
+
+
+def load(
+    path: object,
+    *,
+    free_flyer: bool = False,
+    closures: Iterable[Closure] | None = None,
+    actuated: Iterable[str] | None = None,
+    gravity: npt.ArrayLike | None = None,
+    max_bytes: int = MAX_BYTES,
+) -> ClosedChain:
+    """Load a closed chain: a linkage file (YAML with the key `linkage`), or what `fivebar_pin.io.load` reads.
+
+    Args:
+        path: a linkage file (see `fivebar_pin.planar.load`); a folder with one URDF (and its sidecar) or one MJCF file;
+            a .urdf file whose sidecar lies beside it; an MJCF .xml file; or the name of a mechanism that ships
+            (`fivebar_pin.io.shipped`), where no file or folder is called so.
+        free_flyer: put the root of a URDF on a free-flying base.
+        closures: use these instead of the file's closures; with `actuated`, no sidecar is needed. Not for linkages.
+        actuated: drive these joints instead of the file's.
+        gravity: use this (3,) [m/s2] instead of the file's.
+        max_bytes: size above which a URDF or MJCF file is not read.
+
+    Returns:
+        The chain; meshes are named in its visuals but not read.
+
+    Raises:
+        FileFormatError: a file is missing, malformed or states something impossible; names file, element, way out.
+        InvalidInputError, UnknownNameError: an argument of this call is wrong, or no file and no mechanism that ships
+            has this name.
+    """
+    file = as_path(path)
+    if not is_linkage_file(file):
+        return io.load(
+            path, free_flyer=free_flyer, closures=closures, actuated=actuated, gravity=gravity, max_bytes=max_bytes
+        )
+    if free_flyer or closures is not None:
+        word = "free_flyer" if free_flyer else "closures"
+        raise InvalidInputError(word, free_flyer or closures, "is for URDF and MJCF files; this is a linkage")
+    linkage = load_linkage(file)
+    try:
+        chain = linkage.chain()
+    except FiveBarPinError as error:
+        raise FileFormatError(file, str(error)) from error
+    chain = chain if actuated is None else chain.with_actuated(actuated)
+    return chain if gravity is None else chain.with_gravity(gravity)

@@ -1,0 +1,144 @@
+"""`fivebar-pin close`: a URDF that has lost its sidecar gets it back, and nothing is overwritten or hidden."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fivebar_pin as fb
+from fivebar_pin.cli import main
+
+
+def lone(folder: Path, name: str = "five_bar_case_I") -> Path:
+    """Return a copy of a shipped URDF without its sidecar."""
+    return Path(shutil.copy(fb.io.shipped_path(name), folder / f"{name}.urdf"))
+
+
+@pytest.mark.parametrize("name", fb.io.shipped())
+def test_what_is_written_is_the_mechanism_that_shipped(name: str, tmp_path: Path) -> None:
+    assert main(["close", str(lone(tmp_path, name))]) == 0
+    was, now = fb.load(fb.io.shipped_path(name)), fb.load(tmp_path / f"{name}.urdf")
+    assert {frozenset(c.frames) for c in now.closures} == {frozenset(c.frames) for c in was.closures}
+    assert [c.kind.value for c in now.closures] == ["3d"] * len(was.closures)
+    assert set(now.actuated) == set(was.actuated)
+    assert fb.diagnose(now).ok
+
+
+def test_the_closed_configuration_is_written_beside_the_closures(tmp_path: Path) -> None:
+    main(["close", str(lone(tmp_path))])
+    chain = fb.load(tmp_path / "five_bar_case_I.urdf")
+    assert np.abs(fb.closure_residual(chain, chain.references["closed"])).max() < 1e-12
+
+
+def test_the_tables_name_closure_kind_frames_gap_and_motors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["close", str(lone(tmp_path)), "--dry-run"]) == 0
+    out = capsys.readouterr().out
+    for words in ("closures of ", "gap [m]", "angle [rad]", "O3_link3 O3_link2", "likely", "psi", "on the ground"):
+        assert words in out
+    assert "check: ok, mobility 2, exactly actuated" in out
+    assert [p.name for p in tmp_path.iterdir()] == ["five_bar_case_I.urdf"]
+
+
+def test_an_existing_sidecar_is_refused_before_and_kept_in_what_it_says_besides(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf = lone(tmp_path)
+    sidecar = tmp_path / "five_bar_case_I.yaml"
+    old = "closed_loop: []\ntype: []\nname_mot: []\ngravity: [0.0, -1.0, 0.0]\n"
+    sidecar.write_text(old)
+    assert main(["close", str(urdf)]) == 1
+    assert "five_bar_case_I.yaml: exists already" in capsys.readouterr().err
+    assert sidecar.read_text() == old
+    assert main(["close", str(urdf), "--overwrite"]) == 0
+    chain = fb.load(urdf)
+    assert chain.na == 2 and len(chain.closures) == 1
+    np.testing.assert_array_equal(chain.model.gravity.linear, [0.0, -1.0, 0.0])
+
+
+def test_the_only_sidecar_of_a_folder_is_the_one_that_is_replaced(tmp_path: Path) -> None:
+    """It is the one that load reads, whatever it is called."""
+    lone(tmp_path)
+    (tmp_path / "robot.yaml").write_text("closed_loop: []\ntype: []\nname_mot: []\n")
+    assert main(["close", str(tmp_path)]) == 1
+    assert main(["close", str(tmp_path), "--overwrite"]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["five_bar_case_I.urdf", "robot.yaml"]
+    assert fb.load(tmp_path).na == 2
+
+
+def test_pairs_kind_motors_and_place_can_be_given(tmp_path: Path) -> None:
+    urdf, out = lone(tmp_path, "slider_crank"), tmp_path / "mine.yaml"
+    words = ["--pair", "B_slider", "B_rod", "--kind", "revolute", "--motor", "slider", "--out", str(out)]
+    assert main(["close", str(urdf), *words]) == 0
+    text = out.read_text()
+    for line in (
+        "closed_loop: [[B_slider, B_rod]]",
+        "type: [revolute]",
+        "name_mot: [slider]",
+        "axis: [[0.0, 0.0, 1.0]]",
+    ):
+        assert line in text
+
+
+def test_what_check_refuses_is_said_and_the_exit_code_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    urdf = lone(tmp_path)
+    assert main(["close", str(urdf), "--motor", "psi"]) == 1
+    assert "check: NOT ok: with psi held, gamma, phi_gamma, theta_psi can still move" in capsys.readouterr().out
+    assert fb.load(urdf).actuated == ("psi",)
+    assert main(["check", str(urdf)]) == 1
+
+
+def test_hinges_that_are_called_balls_are_told_of_where_loops_do_not_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf = tmp_path / "balls.urdf"
+    text = fb.io.shipped_path("spatial_rssr").read_text()
+    urdf.write_text(text.replace('"rod_y"', '"spherical_rod"'))
+    assert main(["close", str(urdf), "--motor", "spherical_rod", "crank", "--dry-run"]) == 1
+    assert "note: spherical_rod turn about one axis in the URDF; joint_name and joint_type" in capsys.readouterr().out
+
+
+def test_where_there_is_no_loop_it_is_said_what_was_looked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(
+        '<robot name="arm"><link name="ground"/><link name="arm"/><joint name="shoulder" type="revolute">'
+        '<parent link="ground"/><child link="arm"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    assert main(["close", str(urdf)]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("fivebar-pin close: tree = 'arm' but shows no loop: frames named for one")
+    assert said.endswith("State a pair by hand: --pair FRAME FRAME [--kind 3d|6d|revolute].\n")
+    assert [p.name for p in tmp_path.iterdir()] == ["arm.urdf"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--pair", "B_rod", "B_slide"], "Unknown frame 'B_slide'"),
+        (["--pair", "B_rod", "rod_link"], "must be on two bodies; these are on one"),
+        (["--kind", "ball"], "Unknown closure kind 'ball'; known: 3d, 6d"),
+        (["--motor", "crankk"], "Unknown actuated joint 'crankk'"),
+        (["--out", "nowhere/x.yaml"], "its folder does not exist"),
+    ],
+)
+def test_wrong_words_are_one_line_and_write_nothing(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf = lone(tmp_path, "slider_crank")
+    assert main(["close", str(urdf), *words]) == 1
+    err = capsys.readouterr().err
+    assert said in err and err.count("\n") == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["slider_crank.urdf"]
+
+
+def test_only_a_urdf_can_be_closed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fb.save(fb.load(fb.io.shipped_path("slider_crank")), tmp_path / "one.xml")
+    assert main(["close", str(tmp_path / "one.xml")]) == 1
+    assert "is no .urdf file; a sidecar closes the loops of a URDF only" in capsys.readouterr().err
+    assert main(["close", str(tmp_path / "none.urdf")]) == 1
+    assert "there is no such file or folder" in capsys.readouterr().err
