@@ -77,11 +77,12 @@ from fivebar_pin.balancing.balanced import balance
 from fivebar_pin.balancing.change import Change
 from fivebar_pin.balancing.comparison import Comparison, compare
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
-from fivebar_pin.balancing.counterweights import Counterweight, Realisation, realise
+from fivebar_pin.balancing.counterweights import Counterweight
 from fivebar_pin.balancing.design import Certificate, Design
 from fivebar_pin.balancing.fronts import ParetoFront, pareto
 from fivebar_pin.balancing.pieces import MATERIALS, Bar, Disc, Sphere
 from fivebar_pin.balancing.problem import BalanceProblem, balance_problem
+from fivebar_pin.balancing.realisation import Realisation, realise
 from fivebar_pin.balancing.regions import Ball, Box, Ellipsoid
 from fivebar_pin.balancing.regressors import QUANTITIES, Regressor, regressor
 from fivebar_pin.balancing.scoring import Scores, score

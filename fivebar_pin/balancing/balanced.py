@@ -13,11 +13,12 @@ from fivebar_pin.balancing.conditions import BalanceConditions, conditions_for
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.objectives.weights import Minimised, weights_of
 from fivebar_pin.balancing.pieces.piece import Piece
-from fivebar_pin.balancing.problem import Limits, aim_of, balance_problem
+from fivebar_pin.balancing.problem import Limits, balance_problem
 from fivebar_pin.balancing.regions.region import Region
 from fivebar_pin.balancing.regressors.measures import Motions
 from fivebar_pin.balancing.sampling import SpaceName
 from fivebar_pin.balancing.solvers import DEFAULT
+from fivebar_pin.balancing.variables.choice import aim_of
 from fivebar_pin.balancing.variables.variable import MassBounds, Variable
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import SolverError

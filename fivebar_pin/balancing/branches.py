@@ -24,6 +24,7 @@ from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Branch", "branches", "configurations_meant"]
 
+_NO_OFFSET = 1e-300  # size of offsets that is divided by where there are none [kg]
 _ROUGH = 1e-2  # part of a condition outside another row space that tells branches apart [-]
 
 
@@ -94,5 +95,5 @@ def _alike(a: BalanceConditions, b: BalanceConditions) -> bool:
         return False
     outside = a.basis - (a.basis @ b.basis.T) @ b.basis
     constants = a.offset - a.basis @ b.basis.T @ b.offset
-    size = max(float(np.abs(a.offset).max(initial=0.0)), 1e-300)
+    size = max(float(np.abs(a.offset).max(initial=0.0)), _NO_OFFSET)
     return bool(np.abs(outside).max(initial=0.0) < _ROUGH and np.abs(constants).max(initial=0.0) < _ROUGH * size)

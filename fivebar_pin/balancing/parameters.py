@@ -23,6 +23,7 @@ __all__ = ["INERTIA_PAIRS", "TEN", "Space", "from_pseudo_inertia", "inertia_matr
 TEN = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 INERTIA_PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # order of the inertia entries
 _AXES = "xyz"
+_PARALLEL = 1e-9  # sine of the angle up to which a normal is taken for the joint axis next to it [-]
 _ALIGNED = 1e-12  # difference of an axis to that of a joint, for the parameter to be called after it [-]
 
 
@@ -140,7 +141,7 @@ def plane_axes(n: Array) -> Array:
     """Return the rows e_1, e_2, n (3, 3), right-handed; joint axes where n is one of them (up to sign)."""
     k = int(np.argmax(np.abs(n)))
     unit = np.eye(3)[k]
-    if np.linalg.norm(np.cross(unit, n)) < 1e-9:
+    if np.linalg.norm(np.cross(unit, n)) < _PARALLEL:
         return frozen([np.eye(3)[(k + 1) % 3], np.eye(3)[(k + 2) % 3], unit])
     e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
     e1 /= np.linalg.norm(e1)

@@ -40,19 +40,18 @@ from fivebar_pin.balancing.sampling import SpaceName, random_samples, space_of
 from fivebar_pin.balancing.setting import Setting
 from fivebar_pin.balancing.solve import Question, optimum
 from fivebar_pin.balancing.solvers import DEFAULT, solver_named
-from fivebar_pin.balancing.variables.removed import RemovedMaterial
-from fivebar_pin.balancing.variables.variable import MODES, MassBounds, Stated, Variable
+from fivebar_pin.balancing.variables.choice import chosen
+from fivebar_pin.balancing.variables.variable import MassBounds, Stated, Variable
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["BalanceProblem", "Limits", "aim_of", "balance_problem"]
+__all__ = ["BalanceProblem", "Limits", "balance_problem"]
 
 Limits = Mapping[Any, npt.ArrayLike]  # keys are names or atoms
 _SAMPLES = 50  # configurations that tell whether a mechanism is planar, where there are no conditions
 _SHOWN = ("torque", "shaking_force", "shaking_moment")  # what a design is always measured by along motions
 _SHOWN_WITH_WEIGHT = ("frame_force", "frame_moment")  # the same where gravity acts
-_WORD = "variables"  # the mode of a design whose variables were said in full
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -226,7 +225,7 @@ def balance_problem(
     point = checked("about", about, (3,))
     density = None if material is None else (density_of(material), thickness_of(thickness, chain.length))
     stated = Stated(bodies, region, masses, counterweight, remove, density)
-    word, wanted = _changed(mode, stated, variables)
+    word, wanted = chosen(mode, stated, variables)
     if kind is not None:
         conditions = conditions_for(
             chain, kind, conditions, gravity=gravity, about=about, near=near, space=space, seed=seed
@@ -252,43 +251,6 @@ def balance_problem(
     )
     _ = problem.form  # refuses what makes no program
     return problem
-
-
-def aim_of(mode: str, variables: Sequence[Variable]) -> str:
-    """Return what is minimised unless said otherwise.
-
-    Raises:
-        UnknownNameError: a mode that does not exist.
-        InvalidInputError: variables that are none.
-    """
-    if mode not in MODES:
-        raise UnknownNameError("mode", mode, MODES)
-    return _checked_variables(variables)[0].aim if variables else MODES[mode].aim
-
-
-def _checked_variables(variables: Sequence[Variable]) -> tuple[Variable, ...]:
-    if isinstance(variables, Variable) or not all(isinstance(v, Variable) for v in variables):
-        raise InvalidInputError("variables", variables, "must be a sequence of variables")
-    return tuple(variables)
-
-
-def _changed(mode: str, stated: Stated, variables: Sequence[Variable]) -> tuple[str, tuple[Variable, ...]]:
-    """Return what may change, and the word for it.
-
-    Raises:
-        UnknownNameError: a mode that does not exist.
-        InvalidInputError: variables said in full, and bodies besides.
-    """
-    if mode not in MODES:
-        raise UnknownNameError("mode", mode, MODES)
-    if not variables:
-        removed = (RemovedMaterial(stated.remove, stated.region, stated.density),) if stated.remove else ()
-        return mode, (MODES[mode].of(stated), *removed)
-    besides = (stated.bodies, stated.region, stated.masses, stated.counterweight, stated.remove or None)
-    if any(given is not None for given in besides):
-        rule = "must say all that may change: bodies, region, masses, counterweight and remove have no meaning besides"
-        raise InvalidInputError("variables", list(variables), rule)
-    return _WORD, _checked_variables(variables)
 
 
 def _measurement(

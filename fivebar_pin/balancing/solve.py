@@ -6,18 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, frozen
-from fivebar_pin.balancing.change import Change
 from fivebar_pin.balancing.conic import ConicForm, Cost
 from fivebar_pin.balancing.design import PROVED, Design
+from fivebar_pin.balancing.finishing import compact, exact, made
 from fivebar_pin.balancing.objectives.objective import Objective
 from fivebar_pin.balancing.solvers import SECOND, Block, Certificate, Outcome, Program, solve
 from fivebar_pin.balancing.solvers.cones import outside
 from fivebar_pin.errors import SolverError
 
-__all__ = ["Question", "exact", "optimum"]
+__all__ = ["Question", "optimum"]
 
 _MARGINS = (1e-9, 1e-8, 1e-7, 1e-6)  # how far inside the cones a design is kept, as a share of the moving mass
 _GIVE = ((1e-9, 1e-8), (1e-8, 1e-7))  # margin, and how far regions give way where nothing else is left, the same
@@ -26,9 +25,6 @@ _NEGLIGIBLE = 1e-7  # share of the moving mass that is not worth a piece of mate
 _EXACT = 1e-13  # residual of the conditions of a finished design [of its largest mass or the moving mass]
 _FELT = 1e-9  # factor of an inertia that counts as zero in the conditions and terms of a scaled problem [-]
 _PHYSICAL = 1e-12  # smallest eigenvalue of a pseudo-inertia that counts as zero [kg, kg m, kg m2]
-_LEAST_SHARE = 1e-9  # share in the step onto the conditions of a part that hardly has any material [moving masses]
-_RANK = 1e-10  # singular value of the conditions, weighted by shares, that counts as none, relative
-_STEPS = 3  # onto the conditions; each leaves the round-off of the one before
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,11 +203,11 @@ def _finished(outcome: Outcome, task: _Task) -> tuple[Design | None, str]:
     assert outcome.x is not None
     question, form = task.question, task.question.form
     felt = form.felt(list(question.weights), question.limits) > _FELT
-    x = _compact(form, outcome.x[: form.n], felt)
+    x = compact(form, outcome.x[: form.n], felt)
     for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
         y, residual = exact(form, x, drop)
-        y = _compact(form, y, felt)  # again: inertias about centres that have moved a hair
-        parameters, added, removed, lowest = _made(form, y)
+        y = compact(form, y, felt)  # again: inertias about centres that have moved a hair
+        parameters, added, removed, lowest = made(form, y)
         if residual <= _EXACT and lowest >= -_PHYSICAL:
             break
     else:
@@ -233,50 +229,3 @@ def _finished(outcome: Outcome, task: _Task) -> tuple[Design | None, str]:
         branch=question.near,
     )
     return design, ""
-
-
-def _made(form: ConicForm, y: Array) -> tuple[Array, tuple[Change, ...], tuple[Change, ...], float]:
-    """Return the bodies (nb, 10) of variables y (n,), what was added and removed, the smallest eigenvalue of a body."""
-    pi = np.array(form.setting.chain.inertial_parameters) + form.setting.arms
-    added: list[Change] = []
-    removed: list[Change] = []
-    lowest = np.inf
-    for p in form.parts:
-        made = p.part.make(form.setting, y[p.where], pi)
-        pi, lowest = made.parameters, min(lowest, made.lowest)
-        added += made.added
-        removed += made.removed
-    return pi, tuple(added), tuple(removed), float(lowest)
-
-
-def _compact(form: ConicForm, y: Array, felt: npt.NDArray[np.bool_]) -> Array:
-    """Return the variables with the least inertia that a piece can have, where nothing depends on it."""
-    y = np.array(y)
-    for p in form.parts:
-        y[p.where] = p.part.compact(y[p.where], felt[p.where])
-    return y
-
-
-def exact(form: ConicForm, y: Array, drop: float) -> tuple[Array, float]:
-    """Move y onto the conditions by the smallest step, measured in shares of each body's own material.
-
-    Args:
-        form: the program.
-        y: variables (n,).
-        drop: share of the moving mass below which material is left out altogether.
-
-    Returns:
-        The variables and the largest residual left, scaled.
-    """
-    conditions = form.setting.conditions
-    B = np.zeros((0, form.X0.size)) if conditions is None else conditions.basis
-    held = np.zeros(len(B)) if conditions is None else conditions.offset / form.setting.mass
-    A = np.concatenate([B @ form.E, form.fixed[:, :-1]])
-    b = np.concatenate([B @ form.X0 + held, -form.fixed[:, -1]])
-    mass = np.array([p.part.share(y[p.where]) for p in form.parts])
-    share = np.where((mass < drop) | np.array(form.gone), 0.0, np.maximum(mass, _LEAST_SHARE))
-    share = np.repeat(share, [p.part.size for p in form.parts])
-    y = np.where(share > 0.0, y, 0.0)
-    for _ in range(_STEPS if A.size else 0):
-        y = y - share * np.linalg.lstsq(A * share, A @ y + b, rcond=_RANK)[0]
-    return y, float(np.abs(A @ y + b).max(initial=0.0)) / max(1.0, float(np.abs(y).max(initial=0.0)))

@@ -231,7 +231,7 @@ def _material(chosen: argparse.Namespace) -> str | float | None:
 
 def _piece(chosen: argparse.Namespace, chain: ClosedChain) -> Any:
     """Return what the counterweights are made as, or None for any material."""
-    from fivebar_pin.balancing.counterweights import piece_of
+    from fivebar_pin.balancing.pieces import piece_of
 
     if chosen.realise is None:
         if chosen.arm is not None:

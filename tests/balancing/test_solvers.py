@@ -14,8 +14,8 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.balancing import Ball, Box, Design, balance, balance_problem, pareto
+from fivebar_pin.balancing.finishing import exact
 from fivebar_pin.balancing.parameters import pseudo_inertia
-from fivebar_pin.balancing.solve import exact
 from fivebar_pin.balancing.solvers import SOLVERS, Block, Program, solve, solver_named
 from fivebar_pin.balancing.solvers import answer as answers
 from fivebar_pin.balancing.solvers.bound import lower_bound, reach
@@ -369,7 +369,8 @@ def test_bodies_left_empty_leave_the_program_without_a_trace() -> None:
 def test_masses_that_cancel_in_pairs_are_left_empty() -> None:
     """m(a) + m(b) = 0 and m(c) - m(d) = 0 empty the first two bodies alone; a bound above zero empties none."""
     from fivebar_pin.balancing.facial_reduction import empty, without
-    from fivebar_pin.balancing.variables.material import Bounds, material
+    from fivebar_pin.balancing.variables.asked import material
+    from fivebar_pin.balancing.variables.material import Bounds
     from fivebar_pin.balancing.variables.part import Placed
 
     materials = [Placed(material(b, 1, f"{b}", Bounds(), planar=True), 4 * b) for b in range(4)]

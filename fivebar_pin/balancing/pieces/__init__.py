@@ -22,5 +22,6 @@ from fivebar_pin.balancing.pieces.disc import Disc
 from fivebar_pin.balancing.pieces.materials import MATERIALS
 from fivebar_pin.balancing.pieces.piece import SHAPES, Piece
 from fivebar_pin.balancing.pieces.sphere import Sphere
+from fivebar_pin.balancing.pieces.stated import piece_of
 
-__all__ = ["MATERIALS", "SHAPES", "Bar", "Disc", "Piece", "Sphere"]
+__all__ = ["MATERIALS", "SHAPES", "Bar", "Disc", "Piece", "Sphere", "piece_of"]

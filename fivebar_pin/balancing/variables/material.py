@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.change import change_of
-from fivebar_pin.balancing.moments import SPREAD, TWO, Moments
+from fivebar_pin.balancing.moments import TWO
 from fivebar_pin.balancing.parameters import Space, from_pseudo_inertia, lowest_eigenvalue, pseudo_inertia
 from fivebar_pin.balancing.pieces.materials import Density
 from fivebar_pin.balancing.pieces.solid import Solid
@@ -24,10 +24,7 @@ from fivebar_pin.balancing.variables.part import Made, Part
 from fivebar_pin.balancing.variables.sizes import tightened
 from fivebar_pin.chain import ClosedChain
 
-__all__ = ["Bounds", "Material", "material"]
-
-_FAR = 100.0  # how far an elastic piece may stick out [of the region's least half extent]
-_INSIDE = 1.0 - 1e-6  # share of a region that a piece to be made is solved for, lest round-off make it stick out
+__all__ = ["Bounds", "Material"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +54,11 @@ class Bounds(Immutable):
     taken_from: Array | None = None
     masses: tuple[float, float] | None = None
     cap: float | None = None
+
+    @property
+    def by_direction(self) -> bool:
+        """Whether the in-plane second moments are variables of their own."""
+        return self.taken_from is not None or (self.shape is not None and self.shape.by_direction)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +113,7 @@ class Material(Part):
     @property
     def split(self) -> bool:
         """Whether the in-plane second moments are variables of their own."""
-        return self.planar and _by_direction(self.limits)
+        return self.planar and self.limits.by_direction
 
     def replaces(self) -> tuple[int, ...]:
         """Return the body that it is the whole of."""
@@ -251,60 +253,6 @@ class Material(Part):
         h = z[1:3]
         own = np.outer(h, h) / z[0] if z[0] > 0.0 else np.zeros((2, 2))
         return np.asarray(own + 0.5 * max(0.0, float(z[3] - np.trace(own))) * np.eye(2))
-
-
-def material(body: int, sign: int, label: str, limits: Bounds, *, planar: bool, new: bool = False) -> Material:
-    """Make the variables and cones of a piece of material."""
-    shape, taken = limits.shape, limits.taken_from
-    moments = Moments(
-        planar=planar,
-        center=None if shape is None else shape.center,
-        spread=SPREAD if shape is None else SPREAD * shape.room,
-        by_direction=_by_direction(limits),
-    )
-    if taken is None:
-        moments.physical(label)
-    else:
-        moments.taken_from(label, taken)
-    if shape is not None:
-        moments.cones.add(f"{label} stays in its region", "nonneg", shape.holds(moments), soft=True)
-    overreach = None
-    if limits.solid is not None:
-        overreach = _makeable(moments, label, limits.solid, limits)
-    elif limits.density is not None:
-        moments.no_denser(label, limits.density.least)
-    size, cones = moments.cones.count, moments.cones.blocks()
-    if taken is not None:
-        half = Block(f"{label} <= half its mass", "nonneg", -np.eye(1, size), 0.5 * taken[3:, 3])
-        cones = (*cones, half)
-    return Material(body, sign, planar, label, limits, size, cones, overreach, new)
-
-
-def _by_direction(limits: Bounds) -> bool:
-    """Return whether the in-plane second moments are variables of their own."""
-    return limits.taken_from is not None or (limits.shape is not None and limits.shape.by_direction)
-
-
-def _makeable(moments: Moments, label: str, solid: Solid, limits: Bounds) -> int | None:
-    """Ask for a piece that can be made and lies within its region as a whole; return its overreach."""
-    cones, shape, overreach = moments.cones, limits.shape, None
-    assert shape is not None
-    text, w = f"{label} is {solid.word}", cones.variable(0.5 * shape.room)
-    solid.require(moments, text, w, limits.radius, limits.point)
-    if solid.across is not None:
-        cones.add(f"{label} lies on its line", "zero", [moments.first(solid.across)], np.zeros(1))
-    if limits.elastic:
-        room = shape.room
-        overreach = cones.count
-        out = cones.variable(0.5 * room)
-        cones.add(f"{label} sticks out", "nonneg", [out, _FAR * room * moments.m - out], np.array([1.0, 1.0]))
-        w = w - out
-    if limits.point is not None:
-        if limits.stray is not None:
-            cones.add(f"{label} stays near", "soc", [limits.stray * moments.m, *moments.off(limits.point)])
-        shape = shape.shrunk(_INSIDE)
-    shape.holds_round(moments, f"{label} lies in its region as a whole", w)
-    return overreach
 
 
 def _height_of(parameters: Array, normal: Array) -> float:

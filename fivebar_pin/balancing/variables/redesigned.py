@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from fivebar_pin.balancing.regions.region import Region
 from fivebar_pin.balancing.setting import Setting
-from fivebar_pin.balancing.variables.material import Bounds, material
+from fivebar_pin.balancing.variables.asked import material
+from fivebar_pin.balancing.variables.material import Bounds
 from fivebar_pin.balancing.variables.part import Part
 from fivebar_pin.balancing.variables.placement import check_names, densest, masses_of, shape_of
 from fivebar_pin.balancing.variables.variable import MassBounds, Stated, Variable, register
