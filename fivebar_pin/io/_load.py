@@ -137,7 +137,10 @@ def is_linkage_file(path: Path) -> bool:
     """Tell whether a file is a linkage, see `fivebar_pin.planar`: YAML with the key `linkage`, which no sidecar has."""
     if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
         return False
-    return _LINKAGE.search(read_bounded(path, MAX_SIDECAR_BYTES)) is not None
+    try:
+        return _LINKAGE.search(read_bounded(path, MAX_SIDECAR_BYTES)) is not None
+    except FileFormatError:
+        return False  # whoever reads it says why it cannot be read
 
 
 def sidecar_file(urdf: Path) -> Path | None:
@@ -168,7 +171,7 @@ def _load_urdf(
         raise FileFormatError(
             urdf,
             f"has no sidecar: put {urdf.stem}.yaml beside it with closed_loop, type and name_mot, or pass closures=... "
-            "and actuated=... (closures=() for an open tree)",
+            "and actuated=... (closures=() for an open tree); `fivebar-pin close` proposes one",
         )
     sidecar = Sidecar() if beside is None else read_sidecar(beside)
     note = beside or urdf

@@ -183,5 +183,7 @@ def test_a_linkage_file_is_no_sidecar_of_the_tree_beside_it(tmp_path: Path) -> N
     (tmp_path / "tree.yaml").unlink()
     for name in ("other.yaml", "tree.yaml"):
         (tmp_path / name).write_text(GOOD)
-        assert fb.load(tmp_path / "tree.urdf").closures == ()
+        with pytest.raises(FileFormatError, match=r"has no sidecar: put tree\.yaml beside it"):
+            fb.load(tmp_path / "tree.urdf")
+        assert fb.load(tmp_path / "tree.urdf", closures=(), actuated=()).closures == ()
         (tmp_path / name).unlink()
