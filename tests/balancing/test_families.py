@@ -178,6 +178,8 @@ def test_a_word_stands_for_its_atom() -> None:
     given: tuple[Any, ...] = (
         {"rms_torque": 1.0, "added_mass": 0.1},
         {objectives.Rms("torque"): 1.0, objectives.AddedMass(): 0.1},
+        objectives.Rms("torque") + 0.1 * objectives.AddedMass(),
+        2.0 * (objectives.Rms("torque") * 0.25 + 0.25 * objectives.Rms("torque") + 0.05 * objectives.AddedMass()),
         {"rms_torque": 0.5, objectives.Rms("torque"): 0.5, objectives.AddedMass(): 0.1},
     )
     designs = [balance(chain, "force", minimise=m, region=Ball(0.3), motions=motion) for m in given]

@@ -7,6 +7,7 @@ with a quantity is registered once for all quantities along motions, `Rms` for "
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, TypeVar
 
@@ -23,7 +24,7 @@ from fivebar_pin.balancing.solvers import Block
 from fivebar_pin.balancing.variables.part import Placed
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
-__all__ = ["AlongMotions", "Designs", "Objective", "known", "named", "positive_limit", "register"]
+__all__ = ["AlongMotions", "Designs", "Objective", "Weighted", "known", "named", "positive_limit", "register"]
 
 _PLAIN: list[type[Objective]] = []
 _ALONG: list[type[AlongMotions]] = []
@@ -72,6 +73,16 @@ class Objective(Immutable, ABC):
     distance: ClassVar[bool] = False
     quantity: str | None
 
+    def __mul__(self, weight: float) -> Weighted:
+        """Return it with a weight."""
+        return Weighted({self: weight})
+
+    __rmul__ = __mul__
+
+    def __add__(self, other: Objective | Weighted) -> Weighted:
+        """Return the sum with another atom, or with a sum."""
+        return Weighted({self: 1.0}) + other
+
     @property
     def name(self) -> str:
         """Return the shorthand for it."""
@@ -109,6 +120,39 @@ class Objective(Immutable, ABC):
     def rooted(self, value: float) -> float:
         """Return the value of the root where this atom has a value."""
         return float(np.sqrt(value)) if self.squared else value
+
+
+class Weighted(Mapping[Objective, float]):
+    """A sum of atoms with weights: 2.0 * Rms("torque") + AddedMass()."""
+
+    def __init__(self, weights: Mapping[Objective, float]) -> None:
+        """Keep a copy of the weights."""
+        self._weights = dict(weights)
+
+    def __getitem__(self, atom: Objective) -> float:
+        return self._weights[atom]
+
+    def __iter__(self) -> Iterator[Objective]:
+        return iter(self._weights)
+
+    def __len__(self) -> int:
+        return len(self._weights)
+
+    def __repr__(self) -> str:
+        return " + ".join(f"{weight:g} * {atom!r}" for atom, weight in self._weights.items())
+
+    def __add__(self, other: Objective | Weighted) -> Weighted:
+        """Return the sum with another atom, or with a sum."""
+        total, more = dict(self._weights), {other: 1.0} if isinstance(other, Objective) else other
+        for atom, weight in more.items():
+            total[atom] = total.get(atom, 0.0) + weight
+        return Weighted(total)
+
+    def __mul__(self, weight: float) -> Weighted:
+        """Return all weights times another."""
+        return Weighted({atom: weight * own for atom, own in self._weights.items()})
+
+    __rmul__ = __mul__
 
 
 class AlongMotions(Objective):
