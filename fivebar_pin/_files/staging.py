@@ -26,21 +26,21 @@ try:
 except ImportError:  # no such locks: writers do not wait for each other, and stages of killed ones stay
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["Stage", "flush", "held", "strays"]
+__all__ = ["Staging", "flush", "held", "strays"]
 
 _PATIENCE = 10.0
 """How long a writer waits for another one that is at the same folder [s]; a set is written in far less."""
 _PAUSE = 0.02  # between two looks [s]
 
 
-class Stage:
+class Staging:
     """A hidden folder for the files of one set."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.new, self.old = path, path / "new", path / "old"
 
     @classmethod
-    def holding(cls, files: Mapping[str, bytes], place: Path, folder: Path) -> Stage:
+    def holding(cls, files: Mapping[str, bytes], place: Path, folder: Path) -> Staging:
         """Return a stage in a place, with the files complete and flushed."""
         stage = cls(Path(tempfile.mkdtemp(prefix=_prefix(place, folder), dir=place)))
         try:
@@ -81,7 +81,7 @@ class Stage:
                 os.replace(self.new / name, folder / name)
 
 
-def strays(place: Path, folder: Path) -> list[Stage]:
+def strays(place: Path, folder: Path) -> list[Staging]:
     """Return the stages of a folder that lie in a place; to be asked while the folder is held."""
     prefix = _prefix(place, folder)
     try:
@@ -89,7 +89,7 @@ def strays(place: Path, folder: Path) -> list[Stage]:
             found = [e.path for e in entries if e.name.startswith(prefix) and e.is_dir(follow_symlinks=False)]
     except OSError:
         return []
-    return [Stage(Path(path)) for path in found if Path(path).stat().st_uid == os.geteuid()]
+    return [Staging(Path(path)) for path in found if Path(path).stat().st_uid == os.geteuid()]
 
 
 @contextlib.contextmanager

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from fivebar_pin._files.exchange import exchange
 from fivebar_pin._files.reading import as_path
-from fivebar_pin._files.staging import Stage, flush, held, strays
+from fivebar_pin._files.staging import Staging, flush, held, strays
 from fivebar_pin.errors import InvalidInputError, OutputError
 
 __all__ = ["check_folder", "check_new", "write_file", "write_set"]
@@ -136,7 +136,7 @@ def _missing(folder: Path) -> list[Path]:
 
 def _commit(folder: Path, contents: Mapping[str, bytes]) -> None:
     if len(contents) > 1 and _can_exchange(folder, contents):
-        stage = Stage.holding(contents, folder.parent, folder)
+        stage = Staging.holding(contents, folder.parent, folder)
         with held(stage.new):  # for a moment it has the folder's name: whoever opens it then has to wait as well
             try:
                 if _exchanged(folder, stage, contents):
@@ -144,7 +144,7 @@ def _commit(folder: Path, contents: Mapping[str, bytes]) -> None:
                     return
             finally:
                 stage.settle(folder)
-    stage = Stage.holding(contents, folder, folder)
+    stage = Staging.holding(contents, folder, folder)
     try:
         _move(folder, stage, contents)
     finally:
@@ -161,7 +161,7 @@ def _can_exchange(folder: Path, names: Mapping[str, bytes]) -> bool:
     return len(others) <= _MOST_NAMES and not any(e.is_dir(follow_symlinks=False) for e in others)
 
 
-def _exchanged(folder: Path, stage: Stage, names: Mapping[str, bytes]) -> bool:
+def _exchanged(folder: Path, stage: Staging, names: Mapping[str, bytes]) -> bool:
     """Let folder and stage trade places, and back once the folder itself has the files; False where it cannot be."""
     try:
         _share(folder, stage.new, leave=names)
@@ -191,7 +191,7 @@ def _share(source: Path, other: Path, *, leave: Mapping[str, bytes]) -> None:
                 os.link(source / name, other / name, follow_symlinks=False)
 
 
-def _move(folder: Path, stage: Stage, names: Mapping[str, bytes]) -> None:
+def _move(folder: Path, stage: Staging, names: Mapping[str, bytes]) -> None:
     """Rename the files into place one right after the other; undo that when one of them cannot be."""
     stage.old.mkdir()
     for name in names if len(names) > 1 else ():

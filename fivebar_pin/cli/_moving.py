@@ -13,7 +13,7 @@ from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.trajectory import Trajectory
 
 
-def moved(chain: ClosedChain, file: str | None) -> Trajectory:
+def motion_along(chain: ClosedChain, file: str | None) -> Trajectory:
     """Move the chain as the file says, else let its motors sway as far as they can, else let it stand."""
     if file is not None:
         return drive(chain, laws.from_file(file, chain.actuated))

@@ -15,7 +15,7 @@ from fivebar_pin._files import check_folder, check_new, write_file, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._load import add_gravity, load_any
-from fivebar_pin.cli._moving import moved
+from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
@@ -101,7 +101,7 @@ def run_balance(chosen: argparse.Namespace) -> int:
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
     chain = load_any(chosen.path, chosen.gravity)
-    trajectory = moved(chain, chosen.motion)
+    trajectory = motion_along(chain, chosen.motion)
     minimise = {name: 1.0 if value is None else value for name, value in _pairs("--minimise", chosen.minimise)}
     limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
     console = _tables.console()
@@ -136,7 +136,7 @@ def run_pareto(chosen: argparse.Namespace) -> int:
     integer("--points", chosen.points, least=2, most=_MOST_POINTS)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
     chain = load_any(chosen.path, chosen.gravity)
-    options = _options(chosen, chain, moved(chain, chosen.motion))
+    options = _options(chosen, chain, motion_along(chain, chosen.motion))
     console = _tables.console()
     with _tables.progress().status("tracing the front"):
         front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)

@@ -11,7 +11,7 @@ from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._load import add_gravity, load_any
-from fivebar_pin.cli._moving import moved
+from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.dynamics import Loads, inverse_dynamics
 from fivebar_pin.trajectory import Trajectory
 
@@ -35,7 +35,7 @@ def run(chosen: argparse.Namespace) -> int:
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
     chain = load_any(chosen.path, chosen.gravity)
-    trajectory = moved(chain, chosen.motion)
+    trajectory = motion_along(chain, chosen.motion)
     loads = inverse_dynamics(chain, trajectory, about=chosen.about)
     files: tuple[Path, ...] = ()
     if folder is not None:

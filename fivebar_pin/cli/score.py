@@ -15,7 +15,7 @@ from fivebar_pin._files import as_path, check_new, read_bounded, write_file
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
 from fivebar_pin.cli._load import add_gravity, load_any
-from fivebar_pin.cli._moving import moved
+from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.errors import FileFormatError, InvalidInputError
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def run(chosen: argparse.Namespace) -> int:
         designs = _read(as_path(chosen.designs), chain)
     else:
         designs = variations(chain, chosen.random, spread=chosen.spread, seed=chosen.seed)
-    scores = _scored(chain, moved(chain, chosen.motion), designs, tuple(chosen.terms))
+    scores = _scored(chain, motion_along(chain, chosen.motion), designs, tuple(chosen.terms))
     if out is not None:
         columns = [("design [-]", np.arange(len(scores), dtype=np.float64)), *scores.values.items()]
         write_file(out, _output.columns_text(columns), overwrite=False)

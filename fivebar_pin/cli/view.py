@@ -9,7 +9,7 @@ from fivebar_pin._arrays import integer, number
 from fivebar_pin._files import as_path, check_folder, check_new
 from fivebar_pin.cli import _tables
 from fivebar_pin.cli._load import add_gravity, load_any
-from fivebar_pin.cli._moving import moved
+from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.dynamics import inverse_dynamics
 
 
@@ -39,7 +39,7 @@ def run(chosen: argparse.Namespace) -> int:
         if os.path.lexists(file):
             check_new(file, overwrite=chosen.overwrite)
     chain = load_any(chosen.path, chosen.gravity)
-    trajectory = moved(chain, chosen.motion)
+    trajectory = motion_along(chain, chosen.motion)
     shown = [viz.Shown(chain, trajectory, inverse_dynamics(chain, trajectory) if len(trajectory) > 1 else None)]
     if chosen.html is not None:
         page = viz.html(chosen.html, shown, speed=chosen.speed, overwrite=chosen.overwrite)

@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
 
-__all__ = ["Anchored", "Poses", "Rates", "Segment"]
+__all__ = ["Anchored", "Segment", "TreePoses", "TreeRates"]
 
 
-class Poses(Protocol):
+class TreePoses(Protocol):
     """Configurations q (n, nq), world poses of the joints R (n, 3, 3), p (n, 3) each, motion subspaces S (n, 6, nv)."""
 
     @property
@@ -28,7 +28,7 @@ class Poses(Protocol):
     def S(self) -> Array: ...
 
 
-class Rates(Protocol):
+class TreeRates(Protocol):
     """Spatial velocity V and acceleration A at zero joint accelerations, per joint (n, 6), world axes and origin."""
 
     @property
@@ -82,7 +82,7 @@ class Anchored(ABC):
     columns: npt.NDArray[np.intp]
 
     @abstractmethod
-    def look(self, poses: Poses) -> Any:
+    def look(self, poses: TreePoses) -> Any:
         """Return what the equations need of a batch of n configurations."""
 
     @abstractmethod
@@ -90,11 +90,11 @@ class Anchored(ABC):
         """Return the rows that vanish when the closure is met (n, m)."""
 
     @abstractmethod
-    def jacobian(self, seen: Any, poses: Poses) -> Array:
+    def jacobian(self, seen: Any, poses: TreePoses) -> Array:
         """Return the Jacobian in its columns (n, m, columns): residual rate = jacobian @ v[columns]."""
 
     @abstractmethod
-    def drift(self, seen: Any, rates: Rates) -> Array:
+    def drift(self, seen: Any, rates: TreeRates) -> Array:
         """Return the second rate of the residual at zero joint accelerations (n, m), the closure being met."""
 
     @abstractmethod

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, all_of, number
-from fivebar_pin.closures.anchored import Anchored, Poses, Rates, Segment
+from fivebar_pin.closures.anchored import Anchored, Segment, TreePoses, TreeRates
 from fivebar_pin.closures.closure import Closure, Entry
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -136,16 +136,16 @@ class _Coupled(Anchored):
     places: npt.NDArray[np.intp]
     ratios: Array
 
-    def look(self, poses: Poses) -> Any:
+    def look(self, poses: TreePoses) -> Any:
         return poses.q[:, self.places]
 
     def residual(self, seen: Array) -> Array:
         return np.asarray(seen @ self.ratios - self.closure.offset)[:, None]
 
-    def jacobian(self, seen: Array, poses: Poses) -> Array:
+    def jacobian(self, seen: Array, poses: TreePoses) -> Array:
         return np.broadcast_to(self.ratios, (len(seen), 1, self.ratios.size))
 
-    def drift(self, seen: Array, rates: Rates) -> Array:
+    def drift(self, seen: Array, rates: TreeRates) -> Array:
         return np.zeros((len(seen), 1))
 
     def selector(self, seen: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, all_of, cross, skew
-from fivebar_pin.closures.anchored import Anchored, Poses, Rates, Segment
+from fivebar_pin.closures.anchored import Anchored, Segment, TreePoses, TreeRates
 from fivebar_pin.closures.closure import Closure
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -139,7 +139,7 @@ class AnchoredFrames(Anchored):
     p: tuple[Array, Array]
     sign: Array
 
-    def look(self, poses: Poses) -> FramePair:
+    def look(self, poses: TreePoses) -> FramePair:
         """Return the world poses of both frames."""
         (i, j), (Ri, Rj), (pi, pj) = self.joints, self.R, self.p
         return FramePair(
@@ -153,11 +153,11 @@ class AnchoredFrames(Anchored):
         """Return the rows (n, m)."""
         return self.closure.residual(seen)
 
-    def jacobian(self, seen: FramePair, poses: Poses) -> Array:
+    def jacobian(self, seen: FramePair, poses: TreePoses) -> Array:
         """Return the Jacobian in its columns (n, m, columns)."""
         return np.asarray(np.matmul(self.closure.selector(seen), poses.S[:, :, self.columns] * self.sign))
 
-    def drift(self, seen: FramePair, rates: Rates) -> Array:
+    def drift(self, seen: FramePair, rates: TreeRates) -> Array:
         """Return the second rate at zero joint accelerations (n, m)."""
         i, j = self.joints
         return self.closure.drift(seen, rates.V[i], rates.V[j], rates.A[i], rates.A[j])

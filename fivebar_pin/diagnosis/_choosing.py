@@ -9,7 +9,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
 from fivebar_pin.diagnosis._candidate import Candidate
 from fivebar_pin.diagnosis._ends import Evidence
-from fivebar_pin.diagnosis._posed import Posed, pose
+from fivebar_pin.diagnosis._posed import Posed, judge
 
 __all__ = ["choose"]
 
@@ -38,7 +38,7 @@ def choose(chain: ClosedChain, candidates: list[Candidate], starts: list[Array])
     posed = []
     for step in range(max(len(c.kinds) for c in candidates)):
         closures = _named_apart(chain, [c.of_kind(c.kinds_from(step)) for c in candidates])
-        posed.append((pose(chain, (*chain.closures, *closures), starts), closures))
+        posed.append((judge(chain, (*chain.closures, *closures), starts), closures))
         if not posed[-1][0].problems:
             return _take(chain, candidates, *posed[-1])
     over = [one for one in posed if one[0].only_over]
@@ -56,7 +56,7 @@ def _choose_the_only(chain: ClosedChain, candidates: list[Candidate], starts: li
             c.reason = f"one of {len(candidates)} pairs of open ends; nothing says which belong together"
         return []
     (c,) = candidates
-    posed = pose(chain, (*chain.closures, c.closure), starts)
+    posed = judge(chain, (*chain.closures, c.closure), starts)
     if not posed.problems and posed.mobility > _FEW:
         c.reason = f"the only two open ends, but {posed.mobility} freedoms would be left: two arms rather than a loop"
         return []
@@ -80,7 +80,7 @@ def _one_by_one(chain: ClosedChain, candidates: list[Candidate], starts: list[Ar
             continue
         for kind in c.kinds:
             (closure,) = _named_apart(base, [c.of_kind(kind)])
-            posed = pose(base, (*base.closures, closure), starts)
+            posed = judge(base, (*base.closures, closure), starts)
             c.closure, c.reason = closure, posed.problems.get(len(base.closures), _first(posed.problems))
             if not posed.problems:
                 c.chosen, c.reason = True, _why(c)

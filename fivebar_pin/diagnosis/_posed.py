@@ -17,7 +17,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.plane import plane_normal
 
-__all__ = ["Posed", "is_planar", "pose"]
+__all__ = ["Posed", "is_planar", "judge"]
 
 
 _REACHED = 1e-12
@@ -50,7 +50,7 @@ class Posed:
         return all(text == _OVER for text in self.problems.values())
 
 
-def pose(chain: ClosedChain, closures: Iterable[Closure], starts: list[Array]) -> Posed:
+def judge(chain: ClosedChain, closures: Iterable[Closure], starts: list[Array]) -> Posed:
     """Close the loops from some configurations, else from random ones, and look at what is left to move."""
     closed = replace(chain, closures=tuple(closures), actuated=())
     loops = loops_of(closed)
@@ -66,7 +66,7 @@ def pose(chain: ClosedChain, closures: Iterable[Closure], starts: list[Array]) -
 
 def _close(chain: ClosedChain, starts: list[Array]) -> tuple[Array, bool]:
     loops = loops_of(chain)
-    q, residual = mobility.close(chain, np.stack(starts), _REACHED)
+    q, residual = mobility.close_all(chain, np.stack(starts), _REACHED)
     good = closed_enough(loops, residual, _REACHED)
     if good.any():
         return q[int(np.argmax(good))], True

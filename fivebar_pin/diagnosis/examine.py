@@ -109,7 +109,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
     else:
         asked = checked("q", q, (chain.nq,))
         asked = np.array(pin.normalize(chain.model, asked))
-        found = mobility.close(chain, asked[None], CLOSED)[0][0]
+        found = mobility.close_all(chain, asked[None], CLOSED)[0][0]
         opened, gap = (float(mobility.gap(loops, x[None])[0]) for x in (found, asked))
         if not _is_closed(loops, asked):
             name, size = loops.worst(residual_of(loops, asked[None])[0])
@@ -155,7 +155,7 @@ def _redundant_rows(loops: Loops, here: Configurations, generic: Configurations)
 def _actuation(chain: ClosedChain, site: Configurations) -> tuple[Actuation, tuple[str, ...], int]:
     """Return the verdict, the joints left free when the actuated ones are held, and the number of motors too many."""
     loops = loops_of(chain)
-    Jp = mobility.held(site.J[0], loops.actuated)
+    Jp = mobility.with_held(site.J[0], loops.actuated)
     free = int(loops.passive.size - loops.rank(Jp))
     excess = chain.na - (chain.nv - site.rank - free)
     undetermined: tuple[str, ...] = ()

@@ -179,10 +179,10 @@ def _load_urdf(
     tree = _counting(tree, stated if closures is None else closures)
     model = build_model(tree, sidecar, free_flyer=free_flyer, urdf=urdf, beside=note)
     if closures is None:
-        check_closures(model, sidecar.closures, note, "closed_loop")
-        check_closures(model, stated[len(sidecar.closures) :], urdf, "mimic")
+        check_file_closures(model, sidecar.closures, note, "closed_loop")
+        check_file_closures(model, stated[len(sidecar.closures) :], urdf, "mimic")
     if actuated is None:
-        check_actuated(model, tree, sidecar, note)
+        check_file_actuated(model, tree, sidecar, note)
     check_springs(model, sidecar.springs, note)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     return make_chain(
@@ -237,7 +237,7 @@ def make_chain(
         raise FileFormatError(file, str(error)) from error
 
 
-def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
+def check_file_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, key: str) -> None:
     """Refuse closures that do not fit the model, or name frames that are ambiguous (a link's name never is)."""
     frames: dict[str, list[pin.Frame]] = {}
     named = frames_by_name(model) if closures else {}
@@ -254,7 +254,7 @@ def check_closures(model: pin.Model, closures: tuple[Closure, ...], file: Path, 
                 raise FileFormatError(file, f"{key}[{k}]: {name!r} is the name of {len(same)} frames; rename one")
 
 
-def check_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Path) -> None:
+def check_file_actuated(model: pin.Model, tree: TreeEntry, sidecar: Sidecar, file: Path) -> None:
     """Refuse driven joints that the files do not have, fix, or give several degrees of freedom."""
     joints = list(model.names)[1:]
     for k, name in enumerate(sidecar.actuated):

@@ -20,15 +20,15 @@ from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import ranks_of, singular_values, truncated_inverse
 
 __all__ = [
-    "close",
+    "close_all",
     "determining_sets",
     "first_closed",
     "gap",
     "generic_site",
-    "held",
     "passive_sigma",
     "redundant_combinations",
     "site_at",
+    "with_held",
 ]
 
 
@@ -51,7 +51,7 @@ def gap(loops: Loops, q: Array) -> Array:
     return Configurations(loops, q).gap
 
 
-def close(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]:
+def close_all(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Array]:
     """Close the loops from starts q (n, nq) with every coordinate free to move.
 
     Returns:
@@ -95,12 +95,12 @@ def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array
     """
     loops = loops_of(chain)
     neutral = np.array(pin.neutral(chain.model))
-    best, residual = close(chain, neutral[None], tolerance)
+    best, residual = close_all(chain, neutral[None], tolerance)
     if closed_enough(loops, residual, tolerance)[0]:
         return best[0], float(gap(loops, best)[0])
     rng, count = np.random.default_rng(seed), _affordable(_STARTS, loops)
     tangent = rng.uniform(-np.pi, np.pi, (count, loops.tree.nv)) * loops.column_scale
-    q, sizes = close(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), tolerance)
+    q, sizes = close_all(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), tolerance)
     q, sizes = np.concatenate([best, q]), np.concatenate([residual, sizes])
     k = int(np.argmin(sizes))
     return q[k], float(gap(loops, q[k : k + 1])[0])
@@ -128,7 +128,7 @@ def generic_site(chain: ClosedChain, site: Configurations, seed: int, tolerance:
         steps = [s.free[0] @ rng.normal(size=s.free.shape[2]) for s in here]
         tangent = np.stack([_STRIDE * d / max(float(np.abs(d).max()), TINY) for d in steps]) * loops.column_scale
         start = loops.tree.integrate(np.concatenate([s.q for s in here]), tangent)
-        q, residual = close(chain, start, tolerance)
+        q, residual = close_all(chain, start, tolerance)
         closed = closed_enough(loops, residual, tolerance)
         here = [site_at(loops, q[k]) if closed[k] else here[k] for k in range(walkers)]
         for candidate in here:
@@ -141,10 +141,10 @@ def generic_site(chain: ClosedChain, site: Configurations, seed: int, tolerance:
 def _score(loops: Loops, site: Configurations) -> tuple[int, int, float]:
     """Return the rank, the rank with the actuated joints held, and the smallest singular value that counts."""
     s = site.whole.s[0]
-    return site.rank, loops.rank(held(site.J[0], loops.actuated)), float(s[site.rank - 1]) if site.rank else 0.0
+    return site.rank, loops.rank(with_held(site.J[0], loops.actuated)), float(s[site.rank - 1]) if site.rank else 0.0
 
 
-def held(J: Array, joints: npt.NDArray[np.intp]) -> Array:
+def with_held(J: Array, joints: npt.NDArray[np.intp]) -> Array:
     """Return the closure Jacobian (m, nv) with the given velocity coordinates held."""
     out = np.array(J)
     out[:, joints] = 0.0
@@ -196,7 +196,7 @@ def passive_sigma(loops: Loops, J: Array, actuated: npt.NDArray[np.intp]) -> flo
     passive = np.setdiff1d(np.arange(loops.tree.nv), actuated)
     if not passive.size:
         return 1.0
-    s = singular_values(loops.scaled(held(J, actuated)))
+    s = singular_values(loops.scaled(with_held(J, actuated)))
     return float(s[passive.size - 1]) if ranks_of(s) == passive.size else 0.0
 
 

@@ -15,8 +15,8 @@ from fivebar_pin.chain.reshape import with_bodies
 from fivebar_pin.closures import Closure, Coupling
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.planar._parts import GROUND, Gear, Link, Lump, Motor, PointSpring
-from fivebar_pin.planar._shape import Moves, Shape, back, link_poses
-from fivebar_pin.planar._tree import Edge, Tree, block_of, spanning_tree
+from fivebar_pin.planar._shape import LinkShape, Moves, back, link_poses
+from fivebar_pin.planar._tree import Edge, SpanningTree, block_of, spanning_tree
 from fivebar_pin.springs import Spring
 
 __all__ = ["HOME", "built"]
@@ -67,9 +67,9 @@ def built(
 class _Builder:
     """Adds the joints of a tree to a model, and keeps what their placements follow."""
 
-    def __init__(self, name: str, sketch: Mapping[str, complex], links: Mapping[str, Link], tree: Tree) -> None:
+    def __init__(self, name: str, sketch: Mapping[str, complex], links: Mapping[str, Link], tree: SpanningTree) -> None:
         self.links, self.tree = links, tree
-        self.poses, self.shape = link_poses(links, sketch), Shape(links, sketch)
+        self.poses, self.shape = link_poses(links, sketch), LinkShape(links, sketch)
         self.stems: dict[str, Moves] = {GROUND: ()}
         self.placements: list[Placement] = []
         self.home: list[float] = []

@@ -20,7 +20,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.planar._parts import GROUND, Link
 
-__all__ = ["ALONG_X", "ALONG_Y", "Moves", "Shape", "back", "link_poses"]
+__all__ = ["ALONG_X", "ALONG_Y", "LinkShape", "Moves", "back", "link_poses"]
 
 Moves = tuple[tuple[str, Array], ...]
 """Parameter and twist (6,) of each move, in order."""
@@ -34,7 +34,7 @@ def back(moves: Moves) -> Moves:
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class LinkPose:
     """Where a link's axes lie in the sketch: origin [m] and angle [rad]."""
 
     origin: complex
@@ -45,7 +45,7 @@ class Pose:
         return (point - self.origin) * cmath.exp(-1j * self.angle)
 
 
-def link_poses(links: Mapping[str, Link], sketch: Mapping[str, complex]) -> dict[str, Pose]:
+def link_poses(links: Mapping[str, Link], sketch: Mapping[str, complex]) -> dict[str, LinkPose]:
     """Return where every link lies in the sketch.
 
     Raises:
@@ -54,7 +54,7 @@ def link_poses(links: Mapping[str, Link], sketch: Mapping[str, complex]) -> dict
     poses = {}
     for link in links.values():
         if link.name == GROUND:
-            poses[GROUND] = Pose(0j, 0.0)
+            poses[GROUND] = LinkPose(0j, 0.0)
             continue
         origin, angle = sketch[link.points[0]], 0.0
         if link.guide is not None:
@@ -66,11 +66,11 @@ def link_poses(links: Mapping[str, Link], sketch: Mapping[str, complex]) -> dict
                     f"points of bar {link.name}", link.points[:2], "lie on each other in the sketch", "Move one a bit."
                 )
             angle = cmath.phase(ray)
-        poses[link.name] = Pose(origin, angle)
+        poses[link.name] = LinkPose(origin, angle)
     return poses
 
 
-class Shape:
+class LinkShape:
     """Names and values of the parameters of a linkage, and the moves that place its points and lines.
 
     Attributes:
@@ -102,7 +102,7 @@ class Shape:
         """Return the moves from the carrier's own axes to the line that a link slides on; x runs along it."""
         return self._lines[link]
 
-    def _place_points(self, link: Link, pose: Pose, sketch: Mapping[str, complex]) -> None:
+    def _place_points(self, link: Link, pose: LinkPose, sketch: Mapping[str, complex]) -> None:
         for k, point in enumerate(link.points):
             if k == 0 and link.name != GROUND:
                 moves: Moves = ()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.planar._parts import GROUND, Link, Motor
 
-__all__ = ["Cut", "Edge", "Tree", "block_of", "spanning_tree"]
+__all__ = ["Cut", "Edge", "SpanningTree", "block_of", "spanning_tree"]
 
 _DRIVEN, _SLIDE, _PIN = 0, 1, 2
 
@@ -37,7 +37,7 @@ class Cut:
 
 
 @dataclass(frozen=True, slots=True)
-class Tree:
+class SpanningTree:
     """Joints in the order of the tree, every branch to its end first, and what is cut.
 
     Where a slide is cut, a massless block runs on its line, a joint of the tree, and is to be welded to the link.
@@ -47,7 +47,7 @@ class Tree:
     cuts: tuple[Cut, ...]
 
 
-def spanning_tree(name: str, links: Mapping[str, Link], motors: Iterable[Motor]) -> Tree:
+def spanning_tree(name: str, links: Mapping[str, Link], motors: Iterable[Motor]) -> SpanningTree:
     """Choose the tree.
 
     Args:
@@ -84,7 +84,7 @@ def spanning_tree(name: str, links: Mapping[str, Link], motors: Iterable[Motor])
             )
     cuts = tuple(_cuts(links, users, edges))
     blocks = [Edge(cut.first, block_of(cut.second), "") for cut in cuts if not cut.at]
-    return Tree(tuple(_depth_first([*edges, *blocks])), cuts)
+    return SpanningTree(tuple(_depth_first([*edges, *blocks])), cuts)
 
 
 def block_of(link: str) -> str:

@@ -30,7 +30,7 @@ from fivebar_pin.simulation.chart_motion import (
 )
 from fivebar_pin.simulation.dry_friction import Watch
 from fivebar_pin.simulation.output import Interpolant, Record
-from fivebar_pin.simulation.singular_step import Crossing, cross, refine, singular_ahead
+from fivebar_pin.simulation.singular_step import Crossing, refine, singular_ahead, step_over
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["run"]
@@ -155,7 +155,7 @@ class _Steps:
         if ahead is None or ahead > _CROSS * self.h or self.node.t + 2.0 * ahead > self.end:
             return None
         self._recentre()
-        return cross(self.motion, 2.0 * ahead, self.rtol, self.atol)
+        return step_over(self.motion, 2.0 * ahead, self.rtol, self.atol)
 
     def accept(self) -> None:
         """Go on from the node reached; change the chart when it is worn."""

@@ -19,7 +19,7 @@ import numpy as np
 from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.simulation.chart_motion import ChartMotion, Node, is_smooth, next_node
 
-__all__ = ["Collocated", "Crossing", "cross", "lagrange", "refine", "singular_ahead"]
+__all__ = ["Collocated", "Crossing", "lagrange", "refine", "singular_ahead", "step_over"]
 
 
 _SWEEPS, _SWEEPS_AT_LEAST = 40, 3  # substitutions at most, and before they may be found to stall
@@ -81,7 +81,7 @@ def singular_ahead(motion: ChartMotion, within: float) -> float | None:
     return float(dt[k] + 0.5 * dt[1] * (-left - right) / max(slope, TINY))
 
 
-def cross(motion: ChartMotion, h: float, rtol: float, atol: Array) -> Crossing | None:
+def step_over(motion: ChartMotion, h: float, rtol: float, atol: Array) -> Crossing | None:
     """Take one step of length h from the motion's node; None when it does not reach its tolerance."""
     node, y0 = motion.node, motion.start()
     rtol, atol = max(rtol, _FLOOR), np.maximum(atol, 0.1 * _FLOOR)

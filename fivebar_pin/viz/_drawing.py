@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
 from fivebar_pin.springs import Spring
-from fivebar_pin.viz._geometry import Poses, View, body_points, spring_ends
+from fivebar_pin.viz._geometry import BodyPaths, View, body_points, spring_ends
 from fivebar_pin.viz._recording import Colour
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ __all__ = [
     "body_names",
     "ground_closures",
     "is_counterweight",
-    "reach",
+    "points_reached",
     "safe",
 ]
 
@@ -73,7 +73,7 @@ class Drawing:
     """
 
     chain: ClosedChain
-    poses: Poses
+    poses: BodyPaths
     force: Array | None
     frame_force: Array | None
     view: View
@@ -115,7 +115,7 @@ def body_names(chain: ClosedChain) -> tuple[str, ...]:
     return tuple(n if names.count(n) == 1 else safe(j) for n, j in zip(names, chain.joints, strict=True))
 
 
-def reach(chain: ClosedChain, poses: Poses) -> Array:
+def points_reached(chain: ClosedChain, poses: BodyPaths) -> Array:
     """Return points (k, 3) [m] that the mechanism passes: joints, ends of bodies and springs, corners, mass centres."""
     points = [poses.joints[:, j, :3, 3] for j in range(1, chain.model.njoints) if chain.model.parents[j] == 0]
     for j in range(1, chain.model.njoints):

@@ -22,14 +22,23 @@ if TYPE_CHECKING:
     from fivebar_pin.chain import ClosedChain
     from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["JointShape", "Poses", "View", "body_points", "compute_poses", "find_view", "joint_shapes", "spring_ends"]
+__all__ = [
+    "BodyPaths",
+    "JointShape",
+    "View",
+    "body_points",
+    "compute_poses",
+    "find_view",
+    "joint_shapes",
+    "spring_ends",
+]
 
 _SAME = 1e-9  # distance of points that are one [of the body, and for its size at least so many m]
 _ALONG = 1e-9  # component that counts as none [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Poses:
+class BodyPaths:
     """Where every body is at every sample.
 
     Attributes:
@@ -71,7 +80,7 @@ class View:
         return np.asarray(np.cross(self.right, self.up))
 
 
-def compute_poses(chain: ClosedChain, trajectory: Trajectory) -> Poses:
+def compute_poses(chain: ClosedChain, trajectory: Trajectory) -> BodyPaths:
     """Return the forward kinematics of all samples.
 
     Raises:
@@ -91,7 +100,7 @@ def compute_poses(chain: ClosedChain, trajectory: Trajectory) -> Poses:
             joints[k, j] = placement.homogeneous
         if heavy:
             com[k] = pin.centerOfMass(model, data, False)
-    return Poses(t, joints, com)
+    return BodyPaths(t, joints, com)
 
 
 def joint_shapes(chain: ClosedChain, q: Array) -> tuple[JointShape, ...]:

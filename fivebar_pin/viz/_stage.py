@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.viz._drawing import Drawing, amid_ground, reach
+from fivebar_pin.viz._drawing import Drawing, amid_ground, points_reached
 from fivebar_pin.viz._geometry import View
 from fivebar_pin.viz._recording import Colour, Recorder
 
@@ -123,7 +123,7 @@ class Stage:
 def _outline(drawing: Drawing) -> Array:
     """Return the outermost points (k, 3) that a mechanism passes, along right, up, normal; its arrow included."""
     view = drawing.view
-    points = reach(drawing.chain, drawing.poses)
+    points = points_reached(drawing.chain, drawing.poses)
     if drawing.force is not None:
         points = np.concatenate([points, amid_ground(drawing.chain) + drawing.arrow * drawing.force])
     points = points @ np.array([view.right, view.up, view.normal]).T

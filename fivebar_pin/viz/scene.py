@@ -15,7 +15,7 @@ from fivebar_pin._arrays import ROUND_OFF, Array, checked
 from fivebar_pin._files import write_file
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
-from fivebar_pin.viz._drawing import Drawing, reach, safe
+from fivebar_pin.viz._drawing import Drawing, points_reached, safe
 from fivebar_pin.viz._geometry import View, compute_poses, find_view
 from fivebar_pin.viz._mechanism import draw_mechanism
 from fivebar_pin.viz._page import describe, render
@@ -118,7 +118,10 @@ def _drawings(shown: Sequence[Shown], speed: float, spheres_by_mass: bool) -> li
     forces = [_force(s, "shaking_force", len(p.t)) for s, p in zip(shown, everything, strict=True)]
     views = [find_view(s.chain, s.trajectory.q[0]) for s in shown]
     view = views[0] if all(v.planar for v in views) else View(views[0].right, views[0].up, planar=False)
-    size = max(float(np.linalg.norm(np.ptp(reach(s.chain, p), axis=0))) for s, p in zip(shown, everything, strict=True))
+    size = max(
+        float(np.linalg.norm(np.ptp(points_reached(s.chain, p), axis=0)))
+        for s, p in zip(shown, everything, strict=True)
+    )
     size = size if size > 0.0 else 1.0
     largest = max((float(np.max(np.linalg.norm(f, axis=1))) for f in forces if f is not None), default=0.0)
     start = min(float(p.t[0]) for p in everything)

@@ -16,7 +16,7 @@ from kills import WRITERS, campaign, fork
 import fivebar_pin as fb
 from fivebar_pin._files import check_folder, check_new, read_bounded, write_file, write_set, writing
 from fivebar_pin._files.exchange import exchange
-from fivebar_pin._files.staging import Stage
+from fivebar_pin._files.staging import Staging
 from fivebar_pin.errors import FileFormatError, InvalidInputError, OutputError
 
 OLD = {"a.txt": "old a", "b.txt": "old b", "c.bin": b"old c"}
@@ -161,7 +161,7 @@ def test_names_trade_places_in_one_step_or_not_at_all(tmp_path: Path) -> None:
 @needs_exchange
 def test_what_somebody_put_into_a_folder_that_was_being_replaced_comes_home(folder: Path) -> None:
     """The writer ends between the two exchanges, after another program has opened the folder and made a file in it."""
-    stage = Stage.holding({name: text.encode() for name, text in NEW.items()}, folder.parent, folder)
+    stage = Staging.holding({name: text.encode() for name, text in NEW.items()}, folder.parent, folder)
     for name in ("mine.txt", "c.bin"):
         os.link(folder / name, stage.new / name)
     assert exchange(folder, stage.new)

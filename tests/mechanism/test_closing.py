@@ -11,7 +11,7 @@ from fivebar_pin.mechanism import manifold
 from fivebar_pin.mechanism.closing import Limits, closed_enough, iterate, polish, residual_of, search
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.manifold import ROUND_OFF, manifold_of
-from fivebar_pin.mechanism.mobility import close
+from fivebar_pin.mechanism.mobility import close_all
 
 CHAINS = {
     "four-bar": mechanisms.four_bar(),
@@ -58,7 +58,7 @@ def test_every_road_ends_at_round_off(chain):
     sought = search(loops, starts)
     assert np.abs(residual_of(loops, sought)).max() < 1e-8
     np.testing.assert_allclose(polish(loops, sought).q, near.q, atol=1e-10)
-    _, residual = close(chain, starts, 1e-12)
+    _, residual = close_all(chain, starts, 1e-12)
     assert residual.max() < 1e-14
     least = [closed.project(start, 1e-12) for start in starts]
     assert max(float(np.abs(point.reduced).max()) for point in least) < 100.0 * ROUND_OFF
@@ -111,7 +111,7 @@ def test_what_is_closed_stays_where_it_is():
     loops, q = loops_of(chain), place(chain)
     nearly = loops.tree.integrate(q[None], np.full((1, chain.nv), 2e-14))  # closed, though not to the last digit
     starts = np.concatenate([nearly, loops.tree.integrate(q[None], np.full((1, chain.nv), 0.05))])
-    found, _ = close(chain, starts, 1e-12)
+    found, _ = close_all(chain, starts, 1e-12)
     np.testing.assert_array_equal(found[0], nearly[0])
     assert np.abs(found[1] - starts[1]).max() > 1e-3
 
