@@ -29,6 +29,7 @@ __all__ = ["Samples", "SpaceName", "closed_at", "random_samples", "space_of"]
 
 SpaceName = Literal["auto", "planar", "spatial"]
 
+_FILED = 1e-6  # residual of a closed configuration from a file, with its digits [m or rad, times a length above 1 m]
 _STARTS = 96  # random configurations at a time that a search for closed ones starts from
 _TRIES = 12  # times so many, while nothing closes
 _SEARCH = 60  # steps of a search
@@ -281,4 +282,4 @@ def _limits(chain: ClosedChain, loops: Loops) -> Limits:
 def closed_at(loops: Loops, q: Array) -> bool:
     """Return whether a configuration (nq,) closes the loops, but for what rounding in a file leaves."""
     residual = residual_of(loops, q[None])[0] if loops.m else np.zeros(1)
-    return bool(np.abs(residual).max() <= 1e-6 * max(1.0, loops.length))
+    return bool(np.abs(residual).max() <= _FILED * max(1.0, loops.length))

@@ -25,6 +25,7 @@ _LONGEST, _SHORTEST = 0.7, 1e-4  # steps of a walk [rad, or chain lengths]
 _CAREFUL = 0.2  # longest step of a careful walk over the smallest singular value [rad, or chain lengths]
 _CLOSED = 1e-11  # scaled closure residual of a closed configuration [rad, or chain lengths]
 _NEARLY = 1e-9  # scaled residual below which one more Newton step reaches round-off [rad, or chain lengths]
+_STILL = 1e-12  # length of a heading that has no direction [rad, or chain lengths]
 _NEWTON = 8  # steps of Newton's method
 _DETOUR, _FREE = 0.4, 0.01  # longest way back to the closures, as a share of a step that is at least so long
 
@@ -134,7 +135,7 @@ class Walk:
         along = np.matmul(here.T, np.matmul(np.swapaxes(here.T, 1, 2), self._heading[..., None]))[..., 0]
         length = np.minimum(self._reach, _CAREFUL * here.sigma) if self._careful else self._reach
         length = length * self._rng.uniform(0.3, 1.0, length.size)
-        step = along * (length / np.maximum(np.abs(along).max(axis=1, initial=0.0), 1e-12))[:, None]
+        step = along * (length / np.maximum(np.abs(along).max(axis=1, initial=0.0), _STILL))[:, None]
         longest = _DETOUR * np.maximum(length, _FREE)
         there, detour = close(loops, loops.tree.integrate(here.q, step * loops.column_scale), longest)
         went = there.sound & (detour <= longest) & self._limits.inside(loops, there.q)
@@ -144,7 +145,7 @@ class Walk:
         self._reach = np.clip(np.where(went, 1.5, 0.5) * self._reach, self._shortest, _LONGEST)
         turned = np.where(went[:, None], along, -along)
         size = np.linalg.norm(turned, axis=1, keepdims=True)
-        self._heading = self._straight(turned / np.maximum(size, 1e-12) + self._noise())
+        self._heading = self._straight(turned / np.maximum(size, _STILL) + self._noise())
         return there.of(np.flatnonzero(went))
 
     def _noise(self) -> Array:
@@ -155,4 +156,4 @@ class Walk:
         """Return headings (n, nv) along the tangent space, of length one."""
         T = self.here.T
         along = np.matmul(T, np.matmul(np.swapaxes(T, 1, 2), heading[..., None]))[..., 0]
-        return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12))
+        return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), _STILL))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import checked
-from fivebar_pin._files import MAX_BYTES, as_path
+from fivebar_pin._files import MAX_BYTES, as_path, read_bounded
 from fivebar_pin.chain import ClosedChain, Geometry, Visual, frames_by_name
 from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.closures import Closure
@@ -18,11 +19,13 @@ from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputErr
 from fivebar_pin.io._build import build_model
 from fivebar_pin.io._entries import UNLIMITED, TreeEntry
 from fivebar_pin.io._shipped import shipped, shipped_path
-from fivebar_pin.io._sidecar import Sidecar, read_sidecar
+from fivebar_pin.io._sidecar import MAX_SIDECAR_BYTES, Sidecar, read_sidecar
 from fivebar_pin.io._urdf import read_urdf
 from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["load"]
+
+_LINKAGE = re.compile(rb"^linkage\s*:", re.MULTILINE)
 
 
 def load(
@@ -130,9 +133,22 @@ def _in_folder(folder: Path, endings: tuple[str, ...]) -> list[Path]:
         raise FileFormatError(folder, f"cannot be listed ({error.strerror or error})") from error
 
 
+def is_linkage_file(path: Path) -> bool:
+    """Tell whether a file is a linkage, see `fivebar_pin.planar`: YAML with the key `linkage`, which no sidecar has."""
+    if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
+        return False
+    try:
+        return _LINKAGE.search(read_bounded(path, MAX_SIDECAR_BYTES)) is not None
+    except FileFormatError:
+        return False  # whoever reads it says why it cannot be read
+
+
 def sidecar_file(urdf: Path) -> Path | None:
-    """Return the sidecar that is read with a URDF: of the same name, or the only one of a folder with one URDF."""
-    beside = _in_folder(urdf.parent, (".yaml", ".yml"))
+    """Return the sidecar that is read with a URDF: of the same name, or the only one of a folder with one URDF.
+
+    Linkage files are YAML too, and no sidecars.
+    """
+    beside = [file for file in _in_folder(urdf.parent, (".yaml", ".yml")) if not is_linkage_file(file)]
     same = [f for f in beside if f.stem == urdf.stem]
     if len(same) > 1:
         raise FileFormatError(urdf, f"has two sidecars ({', '.join(f.name for f in same)}); keep one")
@@ -155,7 +171,7 @@ def _load_urdf(
         raise FileFormatError(
             urdf,
             f"has no sidecar: put {urdf.stem}.yaml beside it with closed_loop, type and name_mot, or pass closures=... "
-            "and actuated=... (closures=() for an open tree)",
+            "and actuated=... (closures=() for an open tree); `fivebar-pin close` proposes one",
         )
     sidecar = Sidecar() if beside is None else read_sidecar(beside)
     note = beside or urdf

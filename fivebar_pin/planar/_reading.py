@@ -14,21 +14,13 @@ from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameErro
 from fivebar_pin.io._sidecar import MAX_SIDECAR_BYTES, plain_yaml
 from fivebar_pin.planar.linkage import Linkage
 
-__all__ = ["is_linkage_file", "load"]
+__all__ = ["load"]
 
 _KEYS = ("linkage", "gravity", "points", "ground", "bars", "plates", "slides", "masses", "springs", "gears", "motors")
 _MOTOR = re.compile(r"(?P<link>\S+)(\s+at\s+(?P<at>\S+))?(\s+on\s+(?P<on>\S+))?")
 _DEGREES = re.compile(r"(?P<number>[-+.\de]+)\s*deg")
-_TOP_KEY = re.compile(rb"^linkage\s*:", re.MULTILINE)
 
 Key = str | int
-
-
-def is_linkage_file(path: Path) -> bool:
-    """Tell whether a file is a linkage: YAML with the key `linkage`, which no sidecar has."""
-    if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
-        return False
-    return _TOP_KEY.search(read_bounded(path, MAX_SIDECAR_BYTES)) is not None
 
 
 def load(path: object) -> Linkage:

@@ -175,6 +175,24 @@ def test_the_bound_on_balls_is_that_of_the_balls_themselves() -> None:
     assert realise(design).attained
 
 
+@pytest.mark.parametrize("line", [(1.0, 0.5, 0.0), (1.0, -2.0, 0.0)])
+def test_discs_on_a_line_have_their_centres_on_it(line: tuple[float, float, float]) -> None:
+    """Through the joint, in its axes."""
+    chain, path = crank_rocker()
+    design = balance(
+        chain,
+        None,
+        minimise="rms_shaking_force",
+        region=Ball(0.3),
+        counterweight=Disc(7850.0, 0.01, line=line, arm=0.0),
+        motions=path,
+    )
+    placed = [c for c in design.added if c.mass > 1e-3]
+    assert placed and max(np.linalg.norm(c.place) for c in placed) > 1e-2
+    for c in placed:
+        assert np.cross(line, c.place)[2] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_an_arm_is_a_square_bar_of_its_material_from_the_joint_to_the_rim() -> None:
     """Mass d w^2 l and inertia m (l^2 + w^2) / 12, w a fifth of the radius of the disc that it carries."""
     chain, _ = crank_rocker()

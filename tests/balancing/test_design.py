@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import mechanisms
@@ -559,3 +560,16 @@ def test_numbers_out_of_their_bounds_are_named(options: dict[str, object], said:
     chain, path = case_I()
     with pytest.raises(InvalidInputError, match=said):
         balance(chain, "force", **{"motions": path, **options})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_the_residual_of_a_design_does_not_depend_on_the_unit_of_mass(unit: float) -> None:
+    """It is a share of the moving mass, whatever conditions it is taken of."""
+    chain, _ = case_I()
+    heavy = chain.with_inertial_parameters(unit * chain.inertial_parameters)
+    design = balance(heavy, "force", material=None, region=Ball(REACH))
+    assert design.objective == pytest.approx(0.27 * unit, rel=1e-5)
+    assert design.residual < 1e-14
+    unbalanced = replace(design, parameters=heavy.inertial_parameters)
+    mine = balance(chain, "force", material=None, region=Ball(REACH))
+    assert unbalanced.residual == pytest.approx(replace(mine, parameters=chain.inertial_parameters).residual, rel=1e-9)

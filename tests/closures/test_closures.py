@@ -36,6 +36,8 @@ from fivebar_pin.closures.frame_closure import point_drift, point_rows, point_se
 from fivebar_pin.closures.weld import log3
 from fivebar_pin.errors import AssemblyError, FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.viz._mechanism import _draw_closures
+from fivebar_pin.viz.scene import _drawings
 
 KINDS = ("3d", "6d", "revolute", "cylindrical", "distance")
 
@@ -398,3 +400,29 @@ def test_nothing_outside_the_family_knows_its_kinds():
         text = path.read_text()
         if "fivebar_pin.closures" in text:
             assert not words.search(text), where
+
+
+SIGNS = {"3d": "sphere", "6d": "box", "revolute": "cylinder", "cylindrical": "cylinder", "distance": "sphere"}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_both_frames_are_drawn_as_the_kind_is(kind):
+    """A ball, a box, or a pin along the axis, that of a hinge which may slide longer than that of one which may not."""
+    chain = spatial_pair(kind)
+    drawing = _drawings([viz.Shown.at(chain, pin.neutral(chain.model))], 1.0, False)[0]
+
+    class Spy:
+        def __init__(self):
+            self.drawn = []
+
+        def __getattr__(self, name):
+            return lambda *args, **named: self.drawn.append((name, args))
+
+    spy = Spy()
+    _draw_closures(spy, "m", drawing)
+    marks = [(name, args) for name, args in spy.drawn if name != "place"]
+    assert [name for name, _ in marks] == [SIGNS[kind]] * 2
+    if SIGNS[kind] == "cylinder":
+        _, (_, _, long, _, M) = marks[0]
+        np.testing.assert_allclose(M[:3, 2], chain.closures[0].axis, rtol=0.0, atol=1e-15)
+        assert (long > 5.0 * drawing.radius) == (kind == "cylindrical")

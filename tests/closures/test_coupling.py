@@ -367,12 +367,17 @@ def test_joints_of_a_coupling_count_their_turns(joint):
     assert (model.lowerPositionLimit[kept], model.upperPositionLimit[kept]) == (-0.7, 0.8)
     assert model.gravity == free.gravity and model.name == free.name
     oblique = pin.buildModelFromXML(OBLIQUE)
+    load = pin.Inertia(2.0, np.array([0.1, 0.2, 0.3]), np.eye(3))  # frames remember what was fixed to them
+    oblique.addFrame(pin.Frame("load", 1, 0, pin.SE3.Identity(), pin.FrameType.BODY, load))
     turned = fb.ClosedChain(oblique, (Coupling({"j": 1.0}),), ()).model
     x = 2.3
     poses = [m.createData() for m in (oblique, turned)]
     pin.forwardKinematics(oblique, poses[0], np.array([np.cos(x), np.sin(x)]))
     pin.forwardKinematics(turned, poses[1], np.array([x]))
     np.testing.assert_allclose(poses[1].oMi[1].homogeneous, poses[0].oMi[1].homogeneous, rtol=0.0, atol=1e-14)
+    assert [I.toDynamicParameters().tolist() for I in turned.inertias] == [
+        I.toDynamicParameters().tolist() for I in oblique.inertias
+    ]
     limits = turned.lowerPositionLimit[0], turned.upperPositionLimit[0]
     assert limits[0] < -1e300 and limits[1] > 1e300
 
@@ -422,6 +427,7 @@ def test_limits_of_a_coupled_joint_are_kept(tmp_path: Path):
     chain = fb.ClosedChain(model, pair(2.0).closures, ("a",))
     for file in ("limited.urdf", "limited.xml"):
         fb.save(chain, tmp_path / file)
+        assert 'type="continuous"' not in (tmp_path / file).read_text().split('name="b"')[0]
         again = fb.load(tmp_path / file).model
         assert (again.lowerPositionLimit[0], again.upperPositionLimit[0]) == (-1.0, 2.0)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fivebar_pin as fb
+from fivebar_pin.mechanism import manifold
 from fivebar_pin.mechanism.closing import Limits, closed_enough, iterate, polish, residual_of, search
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.manifold import ROUND_OFF, manifold_of
@@ -48,7 +49,7 @@ def test_an_iteration_leaves_the_array_it_is_given_alone():
 
 @pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS.keys())
 def test_every_road_ends_at_round_off(chain):
-    loops, manifold, q = loops_of(chain), manifold_of(chain), place(chain)
+    loops, closed, q = loops_of(chain), manifold_of(chain), place(chain)
     rng = np.random.default_rng(4)
     starts = loops.tree.integrate(np.repeat(q[None], 5, axis=0), 0.02 * rng.normal(size=(5, chain.nv)))
     near = polish(loops, starts)
@@ -59,7 +60,7 @@ def test_every_road_ends_at_round_off(chain):
     np.testing.assert_allclose(polish(loops, sought).q, near.q, atol=1e-10)
     _, residual = close(chain, starts, 1e-12)
     assert residual.max() < 1e-14
-    least = [manifold.project(start, 1e-12) for start in starts]
+    least = [closed.project(start, 1e-12) for start in starts]
     assert max(float(np.abs(point.reduced).max()) for point in least) < 100.0 * ROUND_OFF
     for k, point in enumerate(least):
         away, other = (
@@ -71,15 +72,15 @@ def test_every_road_ends_at_round_off(chain):
 
 @pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS.keys())
 def test_a_chart_leads_to_the_configuration_with_its_coordinates(chain):
-    manifold, q = manifold_of(chain), place(chain)
-    point = manifold.project(q, 1e-12)
-    rank = manifold.rank_of(point)
-    chart = manifold.chart_at(point, rank)
+    closed, q = manifold_of(chain), place(chain)
+    point = closed.project(q, 1e-12)
+    rank = closed.rank_of(point)
+    chart = closed.chart_at(point, rank)
     xi = np.full(chart.B.shape[1], 0.05)
-    reached = manifold.solve(chart, xi, point.q[0], rank)
-    np.testing.assert_allclose(manifold.coordinates(chart, reached.q[0]), xi, atol=1e-14)
+    reached = closed.solve(chart, xi, point.q[0], rank)
+    np.testing.assert_allclose(closed.coordinates(chart, reached.q[0]), xi, atol=1e-14)
     assert reached.gap[0] < 1e-14
-    assert manifold.solve(chart, xi + 1e6, point.q[0], rank) is None
+    assert closed.solve(chart, xi + 1e6, point.q[0], rank) is None
 
 
 def test_a_search_keeps_limits():
@@ -115,17 +116,35 @@ def test_what_is_closed_stays_where_it_is():
     assert np.abs(found[1] - starts[1]).max() > 1e-3
 
 
+def test_steps_of_least_length_end_where_they_no_longer_help():
+    chain = mechanisms.four_bar(base=mechanisms.at(31.7, -23.1, 11.3, (0.7, -0.4, 1.1)))
+    loops, q = loops_of(chain), place(chain)
+    rng, left = np.random.default_rng(6), []
+    for _ in range(20):
+        rule, looks = manifold._LeastSteps(), []
+
+        def counted(here, which, rule=rule, looks=looks):
+            looks.append(float(np.abs(here.reduced).max()))
+            return rule(here, which)
+
+        iterate(loops, q[None] + 0.02 * rng.normal(size=(1, 3)), counted, most=50)
+        assert len(looks) < 10
+        assert float(np.abs(rule.reached.reduced).max()) == min(looks)  # the best one met is kept
+        left.append(min(looks))
+    assert max(left) > ROUND_OFF  # else the rule was not needed
+
+
 def test_round_off_far_from_the_origin_ends_an_iteration_too():
     """30 m away a gap of 1e-14 m is all that can be asked: less than one metre away leaves 2e-15."""
     chain = mechanisms.four_bar(base=mechanisms.at(31.7, -23.1, 11.3, (0.7, -0.4, 1.1)))
-    manifold = manifold_of(chain)
+    closed = manifold_of(chain)
     rng, q = np.random.default_rng(6), place(chain)
     ends = []
     for _ in range(20):
-        point = manifold.project(q + 0.02 * rng.normal(size=3), 1e-12)
-        rank = manifold.rank_of(point)
-        chart = manifold.chart_at(point, rank)
-        reached = manifold.solve(chart, np.full(chart.B.shape[1], 0.03), point.q[0], rank)
+        point = closed.project(q + 0.02 * rng.normal(size=3), 1e-12)
+        rank = closed.rank_of(point)
+        chart = closed.chart_at(point, rank)
+        reached = closed.solve(chart, np.full(chart.B.shape[1], 0.03), point.q[0], rank)
         assert reached is not None
         ends.append(float(np.abs(reached.reduced).max()))
     assert max(ends) > ROUND_OFF  # else the rule was not needed

@@ -175,3 +175,15 @@ def test_an_unknown_kind_lists_the_known_ones(capsys) -> None:
     assert "known: five-bar, four-bar, six-bar, slider-crank" in capsys.readouterr().err
     with pytest.raises(UnknownNameError, match="kind of linkage"):
         start_text("tri-bar")
+
+
+def test_a_linkage_file_is_no_sidecar_of_the_tree_beside_it(tmp_path: Path) -> None:
+    """Neither as the only YAML file of a folder nor by its name."""
+    fb.save(fb.load("four_bar_crank_rocker"), tmp_path / "tree.urdf")
+    (tmp_path / "tree.yaml").unlink()
+    for name in ("other.yaml", "tree.yaml"):
+        (tmp_path / name).write_text(GOOD)
+        with pytest.raises(FileFormatError, match=r"has no sidecar: put tree\.yaml beside it"):
+            fb.load(tmp_path / "tree.urdf")
+        assert fb.load(tmp_path / "tree.urdf", closures=(), actuated=()).closures == ()
+        (tmp_path / name).unlink()
