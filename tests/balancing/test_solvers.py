@@ -419,12 +419,12 @@ def test_no_solution_is_larger_than_the_sizes_that_bounds_are_taken_over(
 ) -> None:
     """In any direction: a proof within sizes that solutions do not keep would prove nothing."""
     chain, _ = balance_problems.moved("five_bar_case_I")
-    problem = balance_problem(chain, None, region=region, masses=(0.0, 0.5), remove=remove, material=None)
-    program, rng = problem.program, np.random.default_rng(5)
-    assert np.isfinite(problem.sizes).all()
-    largest = np.zeros(problem.n)
+    form = balance_problem(chain, None, region=region, masses=(0.0, 0.5), remove=remove, material=None).form
+    program, rng = form.program, np.random.default_rng(5)
+    assert np.isfinite(form.sizes).all()
+    largest = np.zeros(form.n)
     for _ in range(20):
         x = solve(program, np.zeros(program.n), rng.normal(size=program.n) * np.exp(rng.normal(size=program.n))).x
         assert x is not None
-        largest = np.maximum(largest, np.abs(x[: problem.n]))
-    assert (largest <= problem.sizes * (1.0 + 1e-6) + 1e-9).all()
+        largest = np.maximum(largest, np.abs(x[: form.n]))
+    assert (largest <= form.sizes * (1.0 + 1e-6) + 1e-9).all()

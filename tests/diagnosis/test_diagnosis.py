@@ -575,3 +575,10 @@ def test_of_many_joints_one_good_set_is_looked_for():
     (only,) = d.actuated_sets
     assert {name[-1] for name in only.joints} == set("012345")
     assert only.sigma > 0.01
+
+
+@pytest.mark.parametrize(("largest", "ok"), [(0.2, True), (0.2001, False)])
+def test_a_principal_moment_may_be_the_sum_of_the_other_two_and_no_more(largest, ok):
+    """A flat body lies on the border; a body beyond it would have negative second moments."""
+    flat = rssr().with_inertias({"rocker": pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, largest]))})
+    assert ("break the triangle" not in texts(diagnose(flat), "error")) == ok
