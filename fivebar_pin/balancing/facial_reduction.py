@@ -26,7 +26,9 @@ __all__ = ["empty", "without"]
 
 _ZERO = 1e-9  # coefficient of a condition that counts as none [scaled, rows of unit size]
 _HELD = 0.5  # w at a vertex is 0 or 1; this tells which [-]
-_ROUND_OFF = 1e-13  # what is left of a condition that says nothing any more [of its largest coefficient]
+_ROUND_OFF = (
+    1e-13  # what is left of a condition that says nothing [of its largest coefficient, and of rows of length one]
+)
 
 
 def empty(blocks: Sequence[Block], parts: Sequence[Placed], n: int) -> tuple[bool, ...]:
@@ -60,11 +62,12 @@ def without(blocks: Sequence[Block], parts: Sequence[Placed], gone: Sequence[boo
 
 
 def _stacked(blocks: Sequence[Block], cone: str, n: int) -> Array:
-    """Return the rows [G, g] (k, n + 1) of one kind of cone, of unit size."""
+    """Return the rows [G, g] (k, n + 1) of one kind of cone, of unit size, but for those that say nothing."""
     found = [np.column_stack([b.G, b.g]) for b in blocks if b.cone == cone]
     rows = np.concatenate(found) if found else np.zeros((0, n + 1))
     size = np.abs(rows).max(axis=1, initial=0.0)
-    return np.asarray(rows[size > 0.0] / size[size > 0.0, None])
+    said = size > _ROUND_OFF
+    return np.asarray(rows[said] / size[said, None])
 
 
 def _kernel(A: Array) -> Array:
@@ -92,7 +95,7 @@ def _vanishing(rows: Array, constants: Array, free: int) -> tuple[bool, ...]:
 
 def _kept_rows(block: Block, G: Array) -> list[Block]:
     """Return a block of single rows with other coefficients, without the rows that say nothing any more."""
-    nothing = _ROUND_OFF * np.abs(block.G).max(axis=1, initial=0.0)
+    nothing = _ROUND_OFF * np.maximum(1.0, np.abs(block.G).max(axis=1, initial=0.0))
     holds = np.abs(block.g) <= nothing if block.cone == "zero" else block.g >= -nothing
     said = np.logical_or(np.abs(G).max(axis=1, initial=0.0) > nothing, np.logical_not(holds))
     if not said.any():

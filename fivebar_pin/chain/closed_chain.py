@@ -223,4 +223,11 @@ def _inertia(joint: str, pi: Array) -> pin.Inertia:
             f"first moment of the body of joint {joint}", pi[1:4].tolist(), "must be zero, as its mass"
         )
     I = np.array([[pi[4], pi[5], pi[7]], [pi[5], pi[6], pi[8]], [pi[7], pi[8], pi[9]]])
-    return pin.Inertia(0.0, np.zeros(3), I)
+    try:
+        return pin.Inertia(0.0, np.zeros(3), I)
+    except RuntimeError as error:
+        raise InvalidInputError(
+            f"inertia of the body of joint {joint}",
+            pi[4:].tolist(),
+            "must have no negative moments where it has no mass",
+        ) from error

@@ -128,9 +128,9 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     pairs = loops.pairs(poses)
     J = loops.jacobian(poses, pairs)
     decomposed = Decomposed.of(loops.scaled(J))
-    rank = decomposed.rank
-    multipliers = decomposed.carry(unbalanced * loops.column_scale, rank) * loops.row_scale
-    free_rows = decomposed.left_null(rank)
+    ranks = decomposed.ranks
+    multipliers = decomposed.carry(unbalanced * loops.column_scale, ranks) * loops.row_scale
+    free_rows = decomposed.left_null(ranks)
     determinate_rows = np.linalg.norm(free_rows, axis=1) <= _OPEN
     determinate_rows.setflags(write=False)
     null = free_rows * loops.row_scale * loops.length  # (n, k, m)

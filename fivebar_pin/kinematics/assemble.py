@@ -96,7 +96,7 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
 def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Array:
     q = np.array(near[None])
     here = Configurations(loops, q)
-    if loops.m and closed_enough(loops, here.gap, _FOLLOWED)[0]:
+    if loops.m and closed_enough(loops, here.gap, _FOLLOWED)[0] and not loops.opposed(here.pairs)[0]:
         at = _actuated_at(loops, q, x)
         node = node_at(loops, q[0], at)
         if node.sigma >= SINGULAR:

@@ -74,6 +74,8 @@ Steps are corrected by amounts that go with the square of their length over this
 TIED = 1e-6
 """Rate of the closures along a tangent of the dimension expected, above which the rank is more than expected [-]."""
 
+Ranks = int | npt.NDArray[np.intp]
+
 _WHOLE = 4000
 """Entries of a Jacobian from which on its singular values are computed block by block."""
 
@@ -87,7 +89,8 @@ class Decomposed:
         s: singular values, descending (n, k).
         Vt: (n, nv, nv).
 
-    Wherever a method takes a rank, it is that to work with for the whole batch.
+    Wherever a method takes a rank, it is that to work with for the whole batch; forces take one for each configuration
+    too (n,), since what closures carry at one must not depend on what they can carry at another.
     """
 
     U: Array
@@ -140,23 +143,26 @@ class Decomposed:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(np.einsum("nir,ni->nr", self.U[:, :, :rank], rows) / self.s[:, :rank])
 
-    def carry(self, torque: Array, rank: int) -> Array:
+    def carry(self, torque: Array, rank: Ranks) -> Array:
         """Return the closure forces of least norm (n, m) that carry torques (n, nv), both scaled: J^T f = torque."""
         k = self.s.shape[1]
         loaded = np.matmul(self.Vt[:, :k], torque[..., None])[..., 0] * self._reciprocal(rank)
         return np.asarray(np.matmul(self.U[:, :, :k], loaded[..., None])[..., 0])
 
-    def carrier(self, rank: int) -> Array:
+    def carrier(self, rank: Ranks) -> Array:
         """Return the map (n, m, nv) from torques to the same forces."""
         k = self.s.shape[1]
         return np.asarray(np.matmul(self.U[:, :, :k] * self._reciprocal(rank)[:, None, :], self.Vt[:, :k]))
 
-    def left_null(self, rank: int) -> Array:
-        """Return combinations of rows that vanish, orthonormal (n, m - rank, m)."""
-        return np.swapaxes(self.U[:, :, rank:], 1, 2)
+    def left_null(self, rank: Ranks) -> Array:
+        """Return combinations of rows that vanish, orthonormal (n, m - least rank, m), or zero where fewer do."""
+        least = int(np.min(rank, initial=self.U.shape[1]))
+        null = np.swapaxes(self.U[:, :, least:], 1, 2)
+        vanishes = np.arange(least, self.U.shape[1]) >= np.reshape(rank, (-1, 1))
+        return null if vanishes.all() else np.where(vanishes[..., None], null, 0.0)
 
-    def _reciprocal(self, rank: int) -> Array:
-        counts = np.arange(self.s.shape[1]) < rank
+    def _reciprocal(self, rank: Ranks) -> Array:
+        counts = np.arange(self.s.shape[1]) < np.reshape(rank, (-1, 1))
         return np.where(counts, 1.0 / np.where(self.s > 0.0, self.s, 1.0), 0.0)
 
 

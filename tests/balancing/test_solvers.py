@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import balance_problems
 import mechanisms
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import fivebar_pin as fb
@@ -428,3 +429,26 @@ def test_no_solution_is_larger_than_the_sizes_that_bounds_are_taken_over(
         assert x is not None
         largest = np.maximum(largest, np.abs(x[: form.n]))
     assert (largest <= form.sizes * (1.0 + 1e-6) + 1e-9).all()
+
+
+def gimbal(present: pin.Inertia) -> fb.ClosedChain:
+    """Three hinges through one point, the outer two bodies balanced on it."""
+    model = pin.Model()
+    joint = 0
+    for k, (name, kind) in enumerate((("x", pin.JointModelRX()), ("y", pin.JointModelRY()), ("z", pin.JointModelRZ()))):
+        body = pin.Inertia(1.0, np.zeros(3), np.eye(3)) if k < 2 else present
+        joint = mechanisms.add(model, joint, kind, mechanisms.at(), name, body)
+    return fb.ClosedChain(model, (), ("x", "y", "z"))
+
+
+@pytest.mark.parametrize("masses", [(1.0, 1.0), (0.9, 1.1), (0.7, 0.7), (1.3, 1.3)])
+def test_conditions_of_which_only_round_off_is_left_prove_nothing(masses: tuple[float, float]) -> None:
+    """Bodies that lie balanced leave rows of 1e-17 to the one that may change: no proof of anything."""
+    spread = 3.0 * np.eye(3)
+    spread[0, 2] = spread[2, 0] = -0.5
+    chain = gimbal(pin.Inertia(1.0, np.array([-0.5, 0.0, -0.5]), spread))
+    design = balance(chain, "force", bodies=["z"], region=Ball(2.0), material=None, masses=masses)
+    assert design.status == "optimal"
+    (added,) = design.added
+    np.testing.assert_allclose(added.mass * np.array(added.place), [0.5, 0.0, 0.5], rtol=0.0, atol=1e-9)
+    assert masses[0] - 1e-9 <= added.mass <= masses[1] + 1e-9

@@ -284,3 +284,11 @@ def test_a_body_without_mass_keeps_its_moments_of_inertia_and_has_no_first_momen
         wrong[1, k] = 0.1
         with pytest.raises(InvalidInputError, match=r"first moment of the body of joint coupler .* must be zero"):
             chain.with_inertial_parameters(wrong)
+
+
+def test_a_body_without_mass_has_no_negative_moments():
+    chain = four_bar()
+    pi = np.array(chain.inertial_parameters)
+    pi[1] = [0.0, 0.0, 0.0, 0.0, -1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
+    with pytest.raises(InvalidInputError, match=r"inertia of the body of joint coupler.*no negative moments"):
+        chain.with_inertial_parameters(pi)

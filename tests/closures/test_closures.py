@@ -426,3 +426,11 @@ def test_both_frames_are_drawn_as_the_kind_is(kind):
         _, (_, _, long, _, M) = marks[0]
         np.testing.assert_allclose(M[:3, 2], chain.closures[0].axis, rtol=0.0, atol=1e-15)
         assert (long > 5.0 * drawing.radius) == (kind == "cylindrical")
+
+
+def test_no_way_is_followed_from_a_hinge_back_to_front():
+    """Its axes point against each other: it is met, and yet no configuration to go on from."""
+    chain = hinged_arms(1)
+    with pytest.raises(AssemblyError):
+        fb.assemble(chain, [], [np.pi])
+    np.testing.assert_allclose(fb.assemble(chain, [], [0.0]), [0.0], rtol=0.0, atol=1e-12)
