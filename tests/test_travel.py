@@ -28,7 +28,7 @@ from fivebar_pin.balancing.branches import Branch
 from fivebar_pin.balancing.objectives.overreach import Overreach
 from fivebar_pin.balancing.pieces.trial import Size, Trial
 from fivebar_pin.balancing.solvers.answer import Answer
-from fivebar_pin.balancing.solvers.program import Problem
+from fivebar_pin.balancing.solvers.program import ConicProblem
 from fivebar_pin.balancing.variables import Stated
 from fivebar_pin.paper import polar
 from fivebar_pin.paper.positions import position
@@ -192,7 +192,7 @@ def specimens() -> tuple[object, ...]:
     conic = solvers.solve(program, np.zeros(1), np.ones(1))
     small = (
         conic,
-        Problem(program, np.zeros(1), np.ones(1), -np.ones(1)),
+        ConicProblem(program, np.zeros(1), np.ones(1), -np.ones(1)),
         Answer("solved", np.ones(1), np.ones(1), ""),
     )
     inner += (*small, balancing.pieces.Bar("steel", 0.01), balancing.pieces.Sphere("steel"))

@@ -23,7 +23,7 @@ from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integ
 from fivebar_pin.balancing.parameters import Space, plane_axes
 from fivebar_pin.balancing.regressors.body_motion import BodyMotion
 from fivebar_pin.balancing.sampling import Samples, SpaceName, random_samples, space_of
-from fivebar_pin.balancing.static import held, required_gravity, same_springs, spring_rows, springs_act
+from fivebar_pin.balancing.static import held_by_masses, required_gravity, same_springs, spring_rows, springs_act
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Anchored
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
@@ -214,7 +214,7 @@ def balance_conditions(
             residual=gap,
             tolerance=_CLEAR,
         )
-    offset, outside = held(U, s, rank, R[:, P], parts) if acting else (np.zeros(rank), 0.0)
+    offset, outside = held_by_masses(U, s, rank, R[:, P], parts) if acting else (np.zeros(rank), 0.0)
     unheld = outside / float(np.sqrt(stacked))
     return _conditions(chain, kind, found, s, Vt[:rank], gap, used, weight, point, near, offset, unheld)
 

@@ -24,10 +24,10 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InfeasibleError
 
 PROVED = 1e-5  # gap at which a design counts as optimal [of the objective or its typical size]
-__all__ = ["Asked", "Certificate", "Change", "Design", "Problem"]
+__all__ = ["Asked", "Certificate", "Change", "Design", "Solvable"]
 
 
-class Problem(Protocol):
+class Solvable(Protocol):
     """What a design answers, as far as a design needs it: `BalanceProblem`."""
 
     @property
@@ -43,7 +43,7 @@ class Problem(Protocol):
     ) -> Design:
         """Solve for other weights, or further upper bounds."""
 
-    def in_pieces(self, pieces: Mapping[str, Piece]) -> Problem:
+    def in_pieces(self, pieces: Mapping[str, Piece]) -> Solvable:
         """Return the same problem for counterweights of stated kinds."""
 
     def shape(self, b: int) -> Shape | None:
@@ -54,7 +54,7 @@ class Problem(Protocol):
 class Asked(Immutable):
     """What a design answers: the problem, the weights of its terms, and limits besides those of the problem."""
 
-    problem: Problem
+    problem: Solvable
     minimise: Mapping[Objective, float]
     limits: Mapping[Objective, float]
 

@@ -13,7 +13,7 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers import Block, svec
 
-__all__ = ["Cones", "constant"]
+__all__ = ["Cones", "fixed_form"]
 
 _LIMIT = 48  # variables of one piece; a form is a row of this many factors, however few are used [-]
 
@@ -88,7 +88,7 @@ class Cones:
         return tuple(out)
 
 
-def constant(value: float) -> Array:
+def fixed_form(value: float) -> Array:
     """Return a form that does not depend on any variable."""
     form = np.zeros(_LIMIT + 1)
     form[-1] = value

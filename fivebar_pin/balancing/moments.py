@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.balancing.forms import Cones, constant
+from fivebar_pin.balancing.forms import Cones, fixed_form
 from fivebar_pin.balancing.parameters import INERTIA_PAIRS
 from fivebar_pin.balancing.solvers import svec
 
@@ -65,13 +65,13 @@ class Moments:
 
     def first(self, d: Array) -> Array:
         """Form d.h."""
-        return np.asarray(sum((float(x) * h for x, h in zip(d, self.h, strict=True)), constant(0.0)))
+        return np.asarray(sum((float(x) * h for x, h in zip(d, self.h, strict=True)), fixed_form(0.0)))
 
     def second(self, d: Array, f: Array) -> Array:
         """Form d.S f."""
         assert self.S is not None
         rows = range(self.d)
-        return np.asarray(sum((float(d[i] * f[j]) * self.S[i][j] for i in rows for j in rows), constant(0.0)))
+        return np.asarray(sum((float(d[i] * f[j]) * self.S[i][j] for i in rows for j in rows), fixed_form(0.0)))
 
     def off(self, center: Array) -> list[Array]:
         """Forms h - m c."""
@@ -111,7 +111,7 @@ class Moments:
         )  # in step with the body, however flat
         self.cones.semidefinite(f"{label} is a physical body", inside, way)
         left = [
-            [constant(float(values[keep][i] if i == j else 0.0)) - inside[i][j] for j in range(len(inside))]
+            [fixed_form(float(values[keep][i] if i == j else 0.0)) - inside[i][j] for j in range(len(inside))]
             for i in range(len(inside))
         ]
         self.cones.semidefinite(f"what is left by {label} is a physical body", left, way)
@@ -130,7 +130,7 @@ class Moments:
     def _determinant(self, text: str, least: float) -> None:
         """Ask det(S_c)^(1/3) >= least m^(5/3): S - h h^T / m >= least Z D^-1 Z^T, D = diag(Z), Z lower triangular."""
         assert self.S is not None
-        zero, one, anchor = constant(0.0), constant(1.0), min(1.0, 0.5 * self.spread**2 / least)
+        zero, one, anchor = fixed_form(0.0), fixed_form(1.0), min(1.0, 0.5 * self.spread**2 / least)
         new = self.cones.variable
         Z = [[new(anchor if i == j else 0.0) if j <= i else zero for j in range(3)] for i in range(3)]
         root = float(np.sqrt(least))
@@ -146,7 +146,7 @@ class Moments:
         u = self.cones.variable(min(1.0, self.spread**2 / least))  # the anchor has I_c = 2 spread^2
         self.cones.square(text, self.h, self.m, self.inertia - least * u)
         if power == TWO:
-            self.cones.square(text, self.m, u, constant(1.0))
+            self.cones.square(text, self.m, u, fixed_form(1.0))
         else:
             self._five_thirds(text, u)
         return np.asarray(least * u)
@@ -161,7 +161,7 @@ class Moments:
 
     def _five_thirds(self, text: str, t: Array) -> None:
         """Ask m^(5/3) <= t."""
-        one = constant(1.0)
+        one = fixed_form(1.0)
         self.cones.mean(text, self.m, [t, t, t, one, one, self.m, self.m, self.m])
 
 

@@ -26,7 +26,7 @@ from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["held", "required_gravity", "same_springs", "spring_rows", "springs_act"]
+__all__ = ["held_by_masses", "required_gravity", "same_springs", "spring_rows", "springs_act"]
 
 _ROUND_OFF = 1e-9  # share of the power of all joints' spring torques that is round-off in their sum [-]
 _ALIKE = 1e-9  # difference up to which placements of frames are the same [m, -]
@@ -69,7 +69,7 @@ def required_gravity(chain: ClosedChain, gravity: Array | None) -> float:
     return float(np.linalg.norm(gravity))
 
 
-def held(U: Array, s: Array, rank: int, column: Array, parts: float) -> tuple[Array, float]:
+def held_by_masses(U: Array, s: Array, rank: int, column: Array, parts: float) -> tuple[Array, float]:
     """Return the constants b (rank,) of the conditions V x + b = 0, and the size of what no masses hold.
 
     Args:

@@ -19,7 +19,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.rank import BRANCHING, HELD, TIED
 
-__all__ = ["Ground", "Walk", "close", "ground"]
+__all__ = ["Ground", "Walk", "come_back", "ground"]
 
 _LONGEST, _SHORTEST = 0.7, 1e-4  # steps of a walk [rad, or chain lengths]
 _CAREFUL = 0.2  # longest step of a careful walk over the smallest singular value [rad, or chain lengths]
@@ -70,7 +70,7 @@ def ground(here: Configurations) -> Ground:
     return Ground(here.q, J.tangent, J.sigma, sound, passive.sigma, passive.sign)
 
 
-def close(loops: Loops, q: Array, longest: Array) -> tuple[Ground, Array]:
+def come_back(loops: Loops, q: Array, longest: Array) -> tuple[Ground, Array]:
     """Bring nearly closed configurations (n, nq) to the closures; what is left shows in the residual.
 
     Args:
@@ -137,7 +137,7 @@ class Walk:
         length = length * self._rng.uniform(0.3, 1.0, length.size)
         step = along * (length / np.maximum(np.abs(along).max(axis=1, initial=0.0), _STILL))[:, None]
         longest = _DETOUR * np.maximum(length, _FREE)
-        there, detour = close(loops, loops.tree.integrate(here.q, step * loops.column_scale), longest)
+        there, detour = come_back(loops, loops.tree.integrate(here.q, step * loops.column_scale), longest)
         went = there.sound & (detour <= longest) & self._limits.inside(loops, there.q)
         if self._careful:
             went &= (there.sign == here.sign).all(axis=1) & (there.control > HELD)

@@ -22,7 +22,7 @@ from fivebar_pin.balancing.solvers import answer as answers
 from fivebar_pin.balancing.solvers.bound import lower_bound, reach
 from fivebar_pin.balancing.solvers.certificate import certificate_of
 from fivebar_pin.balancing.solvers.cones import outside, projected, scaling, smat, vector
-from fivebar_pin.balancing.solvers.program import Problem
+from fivebar_pin.balancing.solvers.program import ConicProblem
 from fivebar_pin.cli import main
 from fivebar_pin.errors import SolverError, UnknownNameError
 
@@ -392,7 +392,7 @@ def test_masses_that_cancel_in_pairs_are_left_empty() -> None:
 def test_where_the_default_has_no_acceptable_answer_the_second_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     chain, _ = balance_problems.moved("five_bar_case_I")
 
-    def nothing(problem: Problem, tolerance: float) -> Iterator[answers.Answer]:
+    def nothing(problem: ConicProblem, tolerance: float) -> Iterator[answers.Answer]:
         yield answers.nothing(problem, "gave up")
 
     monkeypatch.setitem(SOLVERS, "clarabel", nothing)

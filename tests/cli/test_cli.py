@@ -11,7 +11,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.cli import main
-from fivebar_pin.cli._moving import moved
+from fivebar_pin.cli._moving import motion_along
 
 
 @pytest.fixture(scope="module")
@@ -243,7 +243,7 @@ def test_balance_shows_what_shakes_beside_what_the_frame_carries(capsys: pytest.
     design = fb.balance(
         fb.load(fb.io.shipped_path("four_bar_crank_rocker")),
         "force",
-        motions=moved(fb.load(fb.io.shipped_path("four_bar_crank_rocker")), None),
+        motions=motion_along(fb.load(fb.io.shipped_path("four_bar_crank_rocker")), None),
     )
     wanted = [design.before["peak_frame_force"], design.before["rms_frame_force"]]
     assert _cells(said, "frame force [N]")[:2] == [f"{x:.4g}" for x in wanted]

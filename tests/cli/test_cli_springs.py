@@ -13,7 +13,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin import JointSpring, Spring
 from fivebar_pin.cli import main
-from fivebar_pin.cli._moving import moved
+from fivebar_pin.cli._moving import motion_along
 
 G, K = 9.81, 400.0
 
@@ -52,7 +52,7 @@ def test_check_names_the_springs(file: str, capsys: pytest.CaptureFixture[str]) 
 
 def test_loads_are_those_of_the_sprung_mechanism(file: str, capsys: pytest.CaptureFixture[str]) -> None:
     chain = fb.load(file)
-    loads = fb.inverse_dynamics(chain, moved(chain, None))
+    loads = fb.inverse_dynamics(chain, motion_along(chain, None))
     assert np.abs(loads.torque).max() != pytest.approx(
         np.abs(fb.inverse_dynamics(chain.with_springs(()), loads.trajectory).torque).max(), rel=0.01
     )
@@ -79,7 +79,7 @@ def test_simulate_says_that_springs_hold_it(capsys: pytest.CaptureFixture[str], 
 def test_scores_are_those_with_springs(file: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     chain = fb.load(file)
     np.save(tmp_path / "own.npy", chain.inertial_parameters[None])
-    rms = float(np.sqrt(np.mean(fb.inverse_dynamics(chain, moved(chain, None)).torque ** 2)))
+    rms = float(np.sqrt(np.mean(fb.inverse_dynamics(chain, motion_along(chain, None)).torque ** 2)))
     text = said(capsys, "score", file, "--designs", str(tmp_path / "own.npy"), "--terms", "rms_torque")
     assert f"{rms:.6g}" in text
 

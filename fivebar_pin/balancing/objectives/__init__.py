@@ -11,7 +11,7 @@ one is an `Objective` with its `word`, and is known by it once it is registered.
 from __future__ import annotations
 
 from fivebar_pin.balancing.objectives.added_mass import AddedMass
-from fivebar_pin.balancing.objectives.distance import Distance
+from fivebar_pin.balancing.objectives.distance import DistanceMoved
 from fivebar_pin.balancing.objectives.inertia import Inertia
 from fivebar_pin.balancing.objectives.linear import Linear
 from fivebar_pin.balancing.objectives.mean_square import MeanSquare
@@ -32,7 +32,7 @@ __all__ = [
     "AddedMass",
     "AlongMotions",
     "Designs",
-    "Distance",
+    "DistanceMoved",
     "Inertia",
     "Linear",
     "MeanSquare",

@@ -11,12 +11,12 @@ from fivebar_pin.balancing.objectives.objective import Designs, Objective, regis
 from fivebar_pin.balancing.objectives.term import Term
 from fivebar_pin.balancing.regressors.measures import Measurement
 
-__all__ = ["Distance"]
+__all__ = ["DistanceMoved"]
 
 
 @register
 @dataclass(frozen=True, slots=True)
-class Distance(Objective):
+class DistanceMoved(Objective):
     """Length of the difference in the scaled parameters [-]."""
 
     word = "distance"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.balancing.forms import constant
+from fivebar_pin.balancing.forms import fixed_form
 from fivebar_pin.balancing.moments import FIVE_THIRDS, TWO, Moments
 
 __all__ = ["FlatSolid", "RoundSolid", "Solid"]
@@ -64,7 +64,7 @@ class FlatSolid(Solid):
         """Bound the outer radius from below, and about a chosen radius and place from above too."""
         u = moments.own_inertia(text, self.least, TWO)
         k = float(np.sqrt(self.alpha * self.least + self.beta))
-        moments.cones.mean(text, float(np.sqrt(k)) * moments.m, [w, w, constant(1.0), moments.m])
+        moments.cones.mean(text, float(np.sqrt(k)) * moments.m, [w, w, fixed_form(1.0), moments.m])
         if radius is not None and point is not None:
             about = moments.inertia_about(point)  # >= I_c, equal for the centre
             square = self.alpha * about + self.beta / self.least * u
@@ -88,7 +88,7 @@ class RoundSolid(Solid):
             moments.own_inertia(text, 2.0 * self.least, FIVE_THIRDS)
         else:
             moments.own_second_moments(text, self.least)
-        moments.cones.mean(text, self.beta**0.75 * moments.m, [w, w, w, constant(1.0)])
+        moments.cones.mean(text, self.beta**0.75 * moments.m, [w, w, w, fixed_form(1.0)])
 
     def polar(self, mass: float) -> float:
         """Return 2 least m^(5/3)."""

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen
-from fivebar_pin.balancing.forms import constant
+from fivebar_pin.balancing.forms import fixed_form
 from fivebar_pin.balancing.moments import Moments
 from fivebar_pin.balancing.regions.region import Region, positive
 from fivebar_pin.balancing.regions.shape import Shape
@@ -60,7 +60,7 @@ class EllipsoidShape(Shape):
 
     def holds_round(self, moments: Moments, text: str, w: Array) -> None:
         """Ask for a ball within an ellipsoid, by the S-lemma: [[m - l, 0, b^T], [0, l 1, A w], [b, A w, m 1]] >= 0."""
-        d, zero, m, semi_axes = moments.d, constant(0.0), moments.m, self.semi_axes
+        d, zero, m, semi_axes = moments.d, fixed_form(0.0), moments.m, self.semi_axes
         along = self.along(moments)
         l = moments.cones.variable(0.5)
         b = [f / float(a) for f, a in zip(along, semi_axes, strict=True)]

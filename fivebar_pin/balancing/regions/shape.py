@@ -9,7 +9,7 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.balancing.forms import constant
+from fivebar_pin.balancing.forms import fixed_form
 from fivebar_pin.balancing.moments import Moments
 
 __all__ = ["Shape"]
@@ -74,7 +74,8 @@ class Shape(Immutable, ABC):
         """Return the forms m d_i.(c' - c) of the mass centre c'."""
         off = moments.off(self.center)
         return [
-            np.asarray(sum((float(x) * f for x, f in zip(axis, off, strict=True)), constant(0.0))) for axis in self.axes
+            np.asarray(sum((float(x) * f for x, f in zip(axis, off, strict=True)), fixed_form(0.0)))
+            for axis in self.axes
         ]
 
     def spreads(self, moments: Moments) -> list[Array]:

@@ -12,7 +12,7 @@ from fivebar_pin.balancing.solvers import clarabel, scipy
 from fivebar_pin.balancing.solvers.answer import Answer, nothing
 from fivebar_pin.balancing.solvers.certificate import Certificate
 from fivebar_pin.balancing.solvers.cones import smat, svec
-from fivebar_pin.balancing.solvers.program import Block, Problem, Program
+from fivebar_pin.balancing.solvers.program import Block, ConicProblem, Program
 from fivebar_pin.balancing.solvers.registry import DEFAULT, SECOND, SOLVERS, register, solver_named
 from fivebar_pin.balancing.solvers.solving import Outcome, solve
 
@@ -23,8 +23,8 @@ __all__ = [
     "Answer",
     "Block",
     "Certificate",
+    "ConicProblem",
     "Outcome",
-    "Problem",
     "Program",
     "clarabel",
     "nothing",

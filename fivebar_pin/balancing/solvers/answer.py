@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable
-from fivebar_pin.balancing.solvers.program import Problem
+from fivebar_pin.balancing.solvers.program import ConicProblem
 
 __all__ = ["Answer", "Solver", "nothing"]
 
@@ -29,9 +29,9 @@ class Answer(Immutable):
     status: str
 
 
-def nothing(problem: Problem, status: str) -> Answer:
+def nothing(problem: ConicProblem, status: str) -> Answer:
     """Return the answer of a solver that has none."""
     return Answer("solved", np.full(problem.q.size, np.nan), np.full(problem.g.size, np.nan), status)
 
 
-Solver = Callable[[Problem, float], Iterator[Answer]]  # problem, tolerance -> answers, each tried harder for
+Solver = Callable[[ConicProblem, float], Iterator[Answer]]  # problem, tolerance -> answers, each tried harder for

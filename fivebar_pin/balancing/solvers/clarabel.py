@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fivebar_pin.balancing.solvers.answer import Answer, nothing
-from fivebar_pin.balancing.solvers.program import Block, Problem
+from fivebar_pin.balancing.solvers.program import Block, ConicProblem
 from fivebar_pin.balancing.solvers.registry import register
 from fivebar_pin.errors import SolverError
 
@@ -31,7 +31,7 @@ _CONES = {"zero": "ZeroConeT", "nonneg": "NonnegativeConeT", "soc": "SecondOrder
 
 
 @register("clarabel")
-def answers(problem: Problem, tolerance: float) -> Iterator[Answer]:
+def answers(problem: ConicProblem, tolerance: float) -> Iterator[Answer]:
     """Solve with one setting after the other, as long as answers are asked for.
 
     Raises:

@@ -15,7 +15,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.cones import CONES, outside, projected
 
-__all__ = ["Block", "Problem", "Program"]
+__all__ = ["Block", "ConicProblem", "Program"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +77,7 @@ class Program:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem(Immutable):
+class ConicProblem(Immutable):
     """One objective over the constraints of a program.
 
     Attributes:

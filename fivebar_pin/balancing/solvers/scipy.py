@@ -21,7 +21,7 @@ from scipy import linalg
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.answer import Answer, nothing
 from fivebar_pin.balancing.solvers.barrier import Barrier, barriers
-from fivebar_pin.balancing.solvers.program import Problem
+from fivebar_pin.balancing.solvers.program import ConicProblem
 from fivebar_pin.balancing.solvers.registry import register
 
 __all__ = ["answers"]
@@ -106,7 +106,7 @@ class _Stage:
 
 
 @register("scipy")
-def answers(problem: Problem, tolerance: float) -> Iterator[Answer]:
+def answers(problem: ConicProblem, tolerance: float) -> Iterator[Answer]:
     """Follow the path in large steps, then, if asked again, in small ones."""
     for factor in _FACTORS:
         try:
@@ -115,7 +115,7 @@ def answers(problem: Problem, tolerance: float) -> Iterator[Answer]:
             yield nothing(problem, "a factorisation failed")
 
 
-def _answer(problem: Problem, tolerance: float, factor: float) -> Answer:
+def _answer(problem: ConicProblem, tolerance: float, factor: float) -> Answer:
     program = problem.program
     cones = [(b.cone, part) for b, part in zip(program.blocks, program.slices, strict=True)]
     equal = np.concatenate([np.arange(0)] + [np.arange(p.start, p.stop) for cone, p in cones if cone == "zero"])

@@ -13,7 +13,7 @@ from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.solvers.answer import Answer
 from fivebar_pin.balancing.solvers.bound import lower_bound, refined
 from fivebar_pin.balancing.solvers.certificate import Certificate, certificate_of
-from fivebar_pin.balancing.solvers.program import Problem, Program
+from fivebar_pin.balancing.solvers.program import ConicProblem, Program
 from fivebar_pin.balancing.solvers.registry import DEFAULT, solver_named
 from fivebar_pin.errors import SolverError
 
@@ -57,7 +57,7 @@ def solve(
         SolverError: no solution to the tolerance and no valid certificate; a solver that is not installed.
         UnknownNameError: there is no such solver.
     """
-    problem = Problem(program, P, q, program.g - np.where(program.soft, margin - give, margin) * program.inward)
+    problem = ConicProblem(program, P, q, program.g - np.where(program.soft, margin - give, margin) * program.inward)
     failure = SolverError("the conic solver was not run")
     for answer in solver_named(solver)(problem, tolerance):
         try:
@@ -67,7 +67,7 @@ def solve(
     raise failure
 
 
-def _outcome(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
+def _outcome(problem: ConicProblem, answer: Answer, tolerance: float) -> Outcome:
     """Check one answer, whatever the solver calls it."""
     if answer.kind == "infeasible":
         certificate = certificate_of(problem.program, answer.z, problem.g)
@@ -79,7 +79,7 @@ def _outcome(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
     return _accepted(problem, answer, tolerance)
 
 
-def _accepted(problem: Problem, answer: Answer, tolerance: float) -> Outcome:
+def _accepted(problem: ConicProblem, answer: Answer, tolerance: float) -> Outcome:
     P, q, g, G = problem.P, problem.q, problem.g, problem.program.G
     x, z = answer.x, answer.z
     if not (np.isfinite(x).all() and np.isfinite(z).all()):
