@@ -475,7 +475,7 @@ def test_a_gap_that_proves_nothing_is_not_called_optimal(monkeypatch: pytest.Mon
 
 
 def test_pieces_that_wander_are_held_until_they_rest() -> None:
-    from fivebar_pin.cli._moving import moved
+    from fivebar_pin.cli._moving import motion_along
 
     chain = fb.load("planar_3rrr")
     design = balance(
@@ -484,6 +484,6 @@ def test_pieces_that_wander_are_held_until_they_rest() -> None:
         minimise={"rms_shaking_moment": 1.0, "added_mass": 0.1},
         region=Ball(3.0 * chain.length),
         counterweight=Bar("brass", 0.2 * chain.length),
-        motions=moved(chain, None),
+        motions=motion_along(chain, None),
     )
     assert realise(design).attained
