@@ -11,9 +11,7 @@ depends on the units. Springs add constants to the conditions of static balance,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Literal
 
 import numpy as np
@@ -22,10 +20,11 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, Immutable, checked, finite, frozen, integer, skew
 from fivebar_pin.balancing.parameters import Space, plane_axes
 from fivebar_pin.balancing.regressors.body_motion import BodyMotion
+from fivebar_pin.balancing.sameness import ALIKE, alike, same_gravity, same_mechanism
 from fivebar_pin.balancing.sampling import Samples, SpaceName, random_samples, space_of
 from fivebar_pin.balancing.static import held_by_masses, required_gravity, same_springs, spring_rows, springs_act
+from fivebar_pin.balancing.written import echelon_form, equation_text, readable_form
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.closures import Anchored
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
 
@@ -38,12 +37,6 @@ _CLEAR = 1e3  # ratio of neighbouring singular values that counts as a clear dec
 _DOUBLINGS = 4  # how often the samples are doubled while the decision is not clear
 _NOTHING = 1e-12  # a largest singular value below this is that of a mechanism that cannot be felt at all [-]
 _ZERO = 1e-17  # what a singular value of zero counts as, so that a full rank is a gap too [of the largest]
-_PIVOT = 1e-6  # part of a column outside those chosen before that lets it lead a row [-, rows of length one]
-_NOISE = 1e-9  # factor of a written condition that is left out [of the largest of its row]
-_SIMPLE = 1e-9  # difference to a simple fraction that is round-off [of the factor]
-_LEAST_FACTOR = 1e-3  # size of factors below which the difference counts as absolute [-]
-_DENOMINATOR = 1000  # the largest of a simple fraction
-_ALIKE = 1e-9  # difference up to which directions [-], points, placements and configurations are the same [m, rad]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -110,8 +103,8 @@ class BalanceConditions(Immutable):
         Where no masses hold the springs, the last one says so.
         """
         names, constants = self.space.names, self.constants(self.reduced * self.space.scale)
-        real = np.abs(self.constants(self.rows)) > _ALIKE * np.abs(self.offset).max(initial=0.0)
-        found = tuple(_equation(row, names, c) for row, c in zip(self.reduced, real * constants, strict=True))
+        real = np.abs(self.constants(self.rows)) > ALIKE * np.abs(self.offset).max(initial=0.0)
+        found = tuple(equation_text(row, names, c) for row, c in zip(self.reduced, real * constants, strict=True))
         return (*found, f"{self.unheld:.4g} (springs, whatever the masses) = 0") if self.unheld else found
 
     def constants(self, rows: Array) -> Array:
@@ -242,56 +235,23 @@ def conditions_for(
     """
     if given is None:
         return balance_conditions(chain, kind, gravity=gravity, about=about, near=near, space=space, seed=seed)
-    if not _same_mechanism(chain, given.chain):
+    if not same_mechanism(chain, given.chain):
         raise InvalidInputError("conditions", given, f"must belong to {chain.name}: its joints, lengths and closures")
     if given.kind != kind:
         raise InvalidInputError("conditions", given, f"must be of kind {kind!r}")
     if space != "auto" and given.space.planar != (space == "planar"):
         raise InvalidInputError("conditions", given, f"must be {space}")
-    if near is not None and not _close(given.near, checked("near", near, (chain.nq,))):
+    if near is not None and not alike(given.near, checked("near", near, (chain.nq,))):
         raise InvalidInputError("conditions", given, "must be those of the branch of near")
     if kind == "static":
         sprung = bool(given.unheld or given.offset.any())
-        if not _same_gravity(given.gravity, _gravity(chain, gravity), sized=sprung):
+        if not same_gravity(given.gravity, _gravity(chain, gravity), sized=sprung):
             raise InvalidInputError("conditions", given, f"must hold for gravity = {gravity!r}")
         if not same_springs(chain, given.chain):
             raise InvalidInputError("conditions", given, f"must hold the springs of {chain.name}")
-    if kind == "moment" and not _close(given.about, checked("about", about, (3,))):
+    if kind == "moment" and not alike(given.about, checked("about", about, (3,))):
         raise InvalidInputError("conditions", given, f"must be about {about!r}")
     return given
-
-
-def _close(a: Array | None, b: Array | None) -> bool:
-    if a is None or b is None:
-        return a is b
-    return bool(np.abs(a - b).max(initial=0.0) <= _ALIKE)
-
-
-def _same_gravity(a: Array | None, b: Array | None, *, sized: bool) -> bool:
-    """Whether two accelerations have the same direction, and the same size where it matters."""
-    if a is None or b is None:
-        return a is b
-    one, two = float(np.linalg.norm(a)), float(np.linalg.norm(b))
-    return _close(a / one, b / two) and (not sized or abs(one - two) <= _ALIKE * one)
-
-
-def _same_mechanism(a: ClosedChain, b: ClosedChain) -> bool:
-    """Whether two chains differ in nothing but masses, motors and names."""
-    if a is b:
-        return True
-    one, two = a.model, b.model
-    if a.joints != b.joints or a.nq != b.nq or len(a.closures) != len(b.closures):
-        return False
-    tree = list(one.parents) == list(two.parents) and all(
-        M.isApprox(W, _ALIKE) and j == k
-        for M, W, j, k in zip(one.jointPlacements, two.jointPlacements, one.joints, two.joints, strict=True)
-    )
-    pairs = zip(loops_of(a).anchored, loops_of(b).anchored, strict=True)
-    return tree and all(_same_closure(c, d) for c, d in pairs)
-
-
-def _same_closure(c: Anchored, d: Anchored) -> bool:
-    return c.closure.kind == d.closure.kind and c.tied == d.tied and _close(c.numbers(), d.numbers())
 
 
 def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Array) -> tuple[Array, Array]:
@@ -359,7 +319,7 @@ def _conditions(
     offset: Array,
     unheld: float,
 ) -> BalanceConditions:
-    echelon = _echelon(basis, space)
+    echelon = echelon_form(basis, space)
     return BalanceConditions(
         chain=chain,
         kind=kind,
@@ -368,7 +328,7 @@ def _conditions(
         basis=frozen(basis),
         matrix=frozen((basis / space.scale) @ space.selection()),
         rows=frozen(echelon / np.linalg.norm(echelon, axis=1, keepdims=True)),
-        reduced=frozen(_readable(echelon, space)),
+        reduced=frozen(readable_form(echelon, space)),
         singular_values=frozen(s / s[0] if s.size and s[0] > 0.0 else s),
         gap=gap,
         samples=samples,
@@ -393,47 +353,3 @@ def _gap(s: Array) -> tuple[int, float]:
     ratio = np.where(allowed[: ratio.size], ratio, 0.0)
     rank = int(np.argmax(ratio)) + 1
     return rank, float(ratio[rank - 1])
-
-
-def _echelon(basis: Array, space: Space) -> Array:
-    """Return the scaled reduced row echelon form; inertias and first moments of the later bodies lead."""
-    rank, P = basis.shape
-    orders = np.tile(space.orders, len(space.bodies))
-    preference = sorted(range(P), key=lambda k: (-orders[k], -(k // space.width), k))
-    pivots: list[int] = []
-    chosen = np.zeros((rank, 0))
-    for k in preference:
-        left = basis[:, k] - chosen @ (chosen.T @ basis[:, k])
-        if len(pivots) < rank and np.linalg.norm(left) > _PIVOT:
-            pivots.append(k)
-            left -= chosen @ (chosen.T @ left)
-            chosen = np.column_stack([chosen, left / np.linalg.norm(left)])
-    return np.asarray(np.linalg.solve(basis[:, pivots], basis)[np.argsort(pivots)])
-
-
-def _readable(echelon: Array, space: Space) -> Array:
-    """Return the form in SI units: leading factor one, noise gone, simple fractions recognised."""
-    out = np.zeros_like(echelon)
-    for row, tidy in zip(echelon, out, strict=True):
-        real = np.abs(row) > _NOISE * np.abs(row).max()
-        lead = int(np.argmin(np.abs(row - 1.0)))
-        for k in np.flatnonzero(real):
-            tidy[k] = _tidy(float(row[k] / space.scale[k] * space.scale[lead]))
-    return out
-
-
-def _tidy(x: float) -> float:
-    """Return the simple fraction that x stands for, if there is one."""
-    simple = float(Fraction(x).limit_denominator(_DENOMINATOR))
-    return simple if abs(simple - x) < _SIMPLE * max(abs(x), _LEAST_FACTOR) else x
-
-
-def _equation(row: Array, names: Sequence[str], constant: float = 0.0) -> str:
-    terms: list[str] = []
-    for k in sorted((int(i) for i in np.flatnonzero(row)), key=lambda k: (row[k] != 1.0, k)):
-        factor = f"{abs(row[k]):.10g} " if abs(row[k]) != 1.0 else ""
-        sign = ("-" if row[k] < 0 else "") if not terms else (" - " if row[k] < 0 else " + ")
-        terms.append(f"{sign}{factor}{names[k]}")
-    if constant:
-        terms.append(f" {'-' if constant < 0.0 else '+'} {abs(constant):.10g}")
-    return "".join(terms) + " = 0"
