@@ -64,7 +64,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser() -> argparse.ArgumentParser:
-    from fivebar_pin.cli import balance, check, close, demo, loads, new, score, simulate, view
+    from fivebar_pin.cli import balance, check, close, conditions, demo, loads, new, pareto, score, simulate, view
 
     parser = _Parser(
         prog="fivebar-pin",
@@ -74,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"fivebar-pin {version('fivebar-pin')}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (demo, new, check, close, loads, simulate, balance, score, view):
+    for module in (demo, new, check, close, loads, simulate, conditions, balance, pareto, score, view):
         module.register(commands)
     return parser
 

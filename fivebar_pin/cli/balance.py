@@ -1,65 +1,48 @@
-"""`fivebar-pin conditions`, `balance` and `pareto`: any mechanism, from its balancing conditions to a file."""
+"""`fivebar-pin balance`: the optimal design, or the proof that there is none."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fivebar_pin._arrays import figures, integer, settled
-from fivebar_pin._files import check_folder, check_new, write_file, write_set
+from fivebar_pin._arrays import figures, settled
+from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
-from fivebar_pin.cli._load import add_gravity, load_any
+from fivebar_pin.cli._designing import (
+    SHAPES,
+    add_common,
+    add_designing,
+    given_number,
+    options_of,
+    pairs,
+    piece_of_words,
+)
+from fivebar_pin.cli._load import load_any
 from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.dynamics import inverse_dynamics
-from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 
 _SHOWN = 1e-7  # mass of material that is worth a row [of the moving mass]
-_MOST_POINTS = 10_000  # designs on a front; each is a problem to solve
-
-
-class _Late:
-    """Choices that the library knows, asked for only where they are needed: help, and what was chosen."""
-
-    def __init__(self, module: str, table: str) -> None:
-        self._module, self._table = module, table
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(getattr(import_module(f"fivebar_pin.balancing.{self._module}"), self._table))
-
-    def __contains__(self, word: object) -> bool:
-        return word in tuple(self)
-
-
-_KINDS = _Late("conditions", "KINDS")
-_MODES = _Late("variables", "MODES")
-_SHAPES = _Late("pieces", "SHAPES")
-_SOLVERS = _Late("solvers", "SOLVERS")
 
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the commands to the parser."""
-    conditions = commands.add_parser("conditions", help="the balancing conditions of a mechanism")
-    _common(conditions)
-    conditions.set_defaults(run=run_conditions)
+    """Add the command to the parser."""
     balance = commands.add_parser(
         "balance",
         help="the globally optimal balanced design, or the proof that there is none",
         description="Balance a mechanism; exit code 1 when it is proved to be impossible within the bounds.",
     )
-    _common(balance)
-    _designing(balance)
+    add_common(balance)
+    add_designing(balance)
     balance.add_argument("--minimise", action="append", metavar="TERM[=WEIGHT]", help="what to minimise; repeatable")
     balance.add_argument("--limit", action="append", metavar="TERM=VALUE", help="upper bound on a term; repeatable")
     balance.add_argument(
         "--realise",
-        choices=_SHAPES,
+        choices=SHAPES,
         metavar="SHAPE",
         help="solve for counterweights of this shape, and make them: %(choices)s",
     )
@@ -69,45 +52,22 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     balance.add_argument("--out", metavar="FOLDER", help="write the design, the curves and a page before / after there")
     balance.add_argument("--overwrite", action="store_true", help="replace files that exist already")
     balance.add_argument("--view", action="store_true", help="open the live view before / after (Ctrl-C ends it)")
-    balance.set_defaults(run=run_balance)
-    pareto = commands.add_parser("pareto", help="the front between two objectives of balanced designs")
-    _common(pareto)
-    _designing(pareto)
-    pareto.add_argument("first", help="term that is bounded step by step")
-    pareto.add_argument("second", help="term that is minimised under each bound")
-    pareto.add_argument("--points", type=int, default=11, help="designs on the front [11]")
-    pareto.add_argument("--out", metavar="CSV", help="write the front as a table")
-    pareto.set_defaults(run=run_pareto)
+    balance.set_defaults(run=run)
 
 
-def run_conditions(chosen: argparse.Namespace) -> int:
-    """Find and print the conditions, and how far the mechanism is from them."""
-    from fivebar_pin.balancing import balance_conditions
-
-    chain = load_any(chosen.path, chosen.gravity)
-    conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen, chain))
-    console = _tables.console()
-    console.print(str(conditions), markup=False, soft_wrap=True)
-    residual = float(np.abs(conditions.residual(chain)).max(initial=0.0))
-    sizes = np.abs(conditions.matrix) @ np.abs(chain.inertial_parameters.reshape(-1)) + np.abs(conditions.offset)
-    words = figures(residual, float(sizes.max(initial=0.0)))
-    console.print(f"largest residual of {chain.name} as it is: {words} kg", markup=False)
-    return 0
-
-
-def run_balance(chosen: argparse.Namespace) -> int:
+def run(chosen: argparse.Namespace) -> int:
     """Balance, print, write."""
     from fivebar_pin.balancing import balance, realise
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
     chain = load_any(chosen.path, chosen.gravity)
     trajectory = motion_along(chain, chosen.motion)
-    minimise = {name: 1.0 if value is None else value for name, value in _pairs("--minimise", chosen.minimise)}
-    limits = {name: _given("--limit", name, value) for name, value in _pairs("--limit", chosen.limit)}
+    minimise = {name: 1.0 if value is None else value for name, value in pairs("--minimise", chosen.minimise)}
+    limits = {name: given_number("--limit", name, value) for name, value in pairs("--limit", chosen.limit)}
     console = _tables.console()
     with _tables.progress().status("balancing"):
-        options = _options(chosen, chain, trajectory)
-        piece = _piece(chosen, chain)
+        options = options_of(chosen, chain, trajectory)
+        piece = piece_of_words(chosen, chain)
         design = balance(chain, chosen.kind, minimise=minimise or None, limits=limits, counterweight=piece, **options)
     if not design.feasible:
         _print_refusal(console, design)
@@ -127,138 +87,6 @@ def run_balance(chosen: argparse.Namespace) -> int:
 
         viz.view(pair, title=_title(design), announce=_tables.announce)
     return 0
-
-
-def run_pareto(chosen: argparse.Namespace) -> int:
-    """Trace the front, print and write it."""
-    from fivebar_pin.balancing import pareto
-
-    integer("--points", chosen.points, least=2, most=_MOST_POINTS)
-    out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
-    chain = load_any(chosen.path, chosen.gravity)
-    options = _options(chosen, chain, motion_along(chain, chosen.motion))
-    console = _tables.console()
-    with _tables.progress().status("tracing the front"):
-        front = pareto(chain, chosen.kind, chosen.first, chosen.second, chosen.points, **options)
-    if out is not None:
-        columns = [(chosen.first, front.values[:, 0]), (chosen.second, front.values[:, 1])]
-        write_file(out, _output.columns_text(columns), overwrite=False)
-    pair = (chosen.first, chosen.second)
-    rows = [[figures(d.terms[name], d.scale(name), digits=6) for name in pair] for d in front.designs]
-    _tables.table(console, f"{chain.name}: {chosen.kind} balance", (chosen.first, chosen.second), rows)
-    _tables.written(console, () if out is None else (out,))
-    return 0
-
-
-def _common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("path", help="URDF with sidecar, MJCF, linkage file, folder, or a shipped mechanism's name")
-    parser.add_argument(
-        "--kind", choices=_KINDS, metavar="KIND", default="force", help="what is to vanish: %(choices)s [force]"
-    )
-    add_gravity(parser)
-    parser.add_argument(
-        "--along",
-        type=float,
-        nargs=3,
-        metavar=("X", "Y", "Z"),
-        help="static balance for gravity along this direction only [any direction]",
-    )
-
-
-def _designing(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--mode", choices=_MODES, metavar="MODE", default="add", help="what may change: %(choices)s [add]"
-    )
-    parser.add_argument("--bodies", nargs="+", metavar="JOINT", help="bodies that may change, by joint [all]")
-    parser.add_argument("--radius", type=float, help="material lies within this distance of each joint [m]")
-    parser.add_argument(
-        "--masses", type=float, nargs=2, metavar=("LOW", "HIGH"), help="bounds on each added mass or new body [kg]"
-    )
-    parser.add_argument("--remove", nargs="+", default=(), metavar="JOINT", help="bodies that may lose material too")
-    parser.add_argument(
-        "--material", default="steel", help="nothing is denser: a name, kg/m3, or 'none' for points of mass [steel]"
-    )
-    parser.add_argument("--thickness", type=float, help="of flat material [m] [a fifth of the mechanism's length]")
-    parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
-    parser.add_argument(
-        "--solver", choices=_SOLVERS, metavar="NAME", help="of the conic program: %(choices)s [the first of them]"
-    )
-    parser.add_argument(
-        "--branch",
-        choices=("all", "motion"),
-        default="all",
-        help="assembly modes: all, or the motion's [all]",
-    )
-
-
-def _direction(chosen: argparse.Namespace, chain: ClosedChain) -> Any:
-    """Return the gravity of static balance: springs are held by the weight that there is, others by any."""
-    if chosen.along is None:
-        return "model" if chosen.kind == "static" and chain.springs else "any"
-    if chosen.kind != "static":
-        raise InvalidInputError("--along", chosen.along, "has a meaning for --kind static only")
-    if chain.springs:
-        raise InvalidInputError("--along", chosen.along, "has no size to hold springs by", "Pass --gravity X Y Z.")
-    return chosen.along
-
-
-def _options(chosen: argparse.Namespace, chain: ClosedChain, trajectory: Trajectory) -> dict[str, Any]:
-    from fivebar_pin.balancing import Ball
-
-    return {
-        "mode": chosen.mode,
-        "bodies": chosen.bodies,
-        "region": None if chosen.radius is None else Ball(chosen.radius),
-        "material": _material(chosen),
-        "thickness": chosen.thickness,
-        "masses": None if chosen.masses is None else tuple(chosen.masses),
-        "remove": chosen.remove,
-        "motions": [trajectory],
-        "gravity": _direction(chosen, chain),
-        "near": trajectory.q[0] if chosen.branch == "motion" else None,
-        **({} if chosen.solver is None else {"solver": chosen.solver}),
-    }
-
-
-def _material(chosen: argparse.Namespace) -> str | float | None:
-    if chosen.material == "none":
-        return None
-    try:
-        return float(chosen.material)
-    except ValueError:
-        return str(chosen.material)
-
-
-def _piece(chosen: argparse.Namespace, chain: ClosedChain) -> Any:
-    """Return what the counterweights are made as, or None for any material."""
-    from fivebar_pin.balancing.pieces import piece_of
-
-    if chosen.realise is None:
-        if chosen.arm is not None:
-            raise InvalidInputError("--arm", chosen.arm, "has a meaning with --realise only")
-        return None
-    material = _material(chosen)
-    if material is None:
-        raise InvalidInputError("--material", chosen.material, "cannot be made: counterweights have a density")
-    return piece_of(chain, chosen.realise, material, chosen.thickness, chosen.arm)
-
-
-def _pairs(option: str, words: list[str] | None) -> list[tuple[str, float | None]]:
-    """Read NAME or NAME=NUMBER."""
-    out: list[tuple[str, float | None]] = []
-    for word in words or []:
-        name, equals, number = word.partition("=")
-        try:
-            out.append((name, float(number) if equals else None))
-        except ValueError:
-            raise InvalidInputError(option, word, "must be NAME=NUMBER") from None
-    return out
-
-
-def _given(option: str, name: str, value: float | None) -> float:
-    if value is None:
-        raise InvalidInputError(option, name, "must be NAME=NUMBER")
-    return value
 
 
 def _title(design: Any) -> str:
