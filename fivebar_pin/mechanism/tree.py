@@ -198,11 +198,26 @@ class Tree:
         return out
 
     def difference(self, q0: Array, q1: Array) -> Array:
-        """Return the tangent that leads from q0 to q1, (n, nv)."""
+        """Return the tangent that leads from q0 to q1, (n, nv).
+
+        Pinocchio's own loses turns of a (cos, sin) joint below 1e-8 rad: it takes them from a cosine.
+        """
         if self.is_vector_space:
             return np.asarray(q1 - q0)
         q0, q1 = np.broadcast_arrays(q0, q1)
-        return np.stack([pin.difference(self._model, a, b) for a, b in zip(q0, q1, strict=True)])
+        others = any(joint is not None and joint.kind is _Kind.OTHER for joint in self.joints)
+        if others:
+            out = np.stack([pin.difference(self._model, a, b) for a, b in zip(q0, q1, strict=True)])
+        else:
+            out = np.empty((q0.shape[0], self.nv))
+        for joint in self.joints[1:]:
+            assert joint is not None
+            if joint.kind is _Kind.UNBOUNDED:
+                (c0, s0), (c1, s1) = (q[:, joint.q].T for q in (q0, q1))
+                out[:, joint.v.start] = np.arctan2(c0 * s1 - s0 * c1, c0 * c1 + s0 * s1)
+            elif joint.kind is not _Kind.OTHER:
+                out[:, joint.v] = q1[:, joint.q] - q0[:, joint.q]
+        return out
 
 
 def motion_cross(V: Array, W: Array) -> Array:

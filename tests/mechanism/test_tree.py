@@ -198,3 +198,18 @@ def test_threads_do_not_share_a_workspace(monkeypatch):
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda q: fb.closure_residual(chain, q), Q))
     np.testing.assert_array_equal(together, alone)
+
+
+@pytest.mark.parametrize("ball", [False, True])
+def test_the_smallest_turn_of_a_continuous_joint_is_not_lost(ball):
+    """The way there and back, for turns from 1e-14 rad on, beside joints of every other kind."""
+    model = pin.Model()
+    for name, kind in (("wheel", pin.JointModelRUBZ()), ("hinge", pin.JointModelRX()), ("slide", pin.JointModelPY())):
+        model.addJoint(model.njoints - 1, kind, pin.SE3.Identity(), name)
+    if ball:
+        model.addJoint(3, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+    tree, rng = Tree(model), np.random.default_rng(3)
+    q0 = np.stack([pin.integrate(model, pin.neutral(model), rng.uniform(-3.0, 3.0, model.nv)) for _ in range(400)])
+    dv = 10.0 ** rng.uniform(-14.0, 0.2, (400, 1)) * rng.choice([-1.0, 1.0], (400, model.nv))
+    found = tree.difference(q0, tree.integrate(q0, dv))
+    np.testing.assert_allclose(found, dv, rtol=1e-12, atol=2e-15)
