@@ -212,7 +212,7 @@ def _mend(
             again = polish(loops, node.q[None])
             for name, values in parts.items():
                 values[k] = getattr(again, name)[0]
-        if b + 1 < index.size and _apart(loops, node.q, nodes[b + 1].q):
+        if b + 1 < index.size and _apart(loops, polish(loops, np.stack([node.q, nodes[b + 1].q])).q):
             raise _located(
                 BranchError(
                     "the motion passes another assembly mode between two samples; refine the motion",
@@ -248,8 +248,9 @@ def _between(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array) -> A
     return guess
 
 
-def _apart(loops: Loops, q0: Array, q1: Array) -> bool:
-    d = loops.tree.difference(q0[None], q1[None])[0] / loops.column_scale
+def _apart(loops: Loops, q: Array) -> bool:
+    """Tell whether two closed configurations (2, nq) are two: nodes as they are differ by what is left of their gaps."""
+    d = loops.tree.difference(q[:1], q[1:])[0] / loops.column_scale
     return bool(np.abs(d).max(initial=0.0) > _APART)
 
 
