@@ -249,7 +249,7 @@ def _between(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array) -> A
 
 
 def _apart(loops: Loops, q: Array) -> bool:
-    """Tell whether two closed configurations (2, nq) are two: nodes as they are differ by what is left of their gaps."""
+    """Tell whether two closed configurations (2, nq) are two; nodes themselves differ by what is left of their gaps."""
     d = loops.tree.difference(q[:1], q[1:])[0] / loops.column_scale
     return bool(np.abs(d).max(initial=0.0) > _APART)
 
