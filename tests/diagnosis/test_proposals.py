@@ -316,7 +316,13 @@ def two_arms(turn: pin.SE3, *, joints: int = 4, marks: bool = True) -> fb.Closed
 
 @pytest.mark.parametrize(
     ("turn", "kind", "rows"),
-    [(at(), "6d", 6), (at(rpy=(0.0, 0.0, 0.7)), "revolute", 5), (at(rpy=(0.4, 0.0, 0.7)), "3d", 3)],
+    [
+        (at(), "6d", 6),
+        (at(rpy=(0.0, 0.0, 0.7)), "revolute", 5),
+        (at(rpy=(1e-3, 0.0, 0.7)), "revolute", 5),  # the rounding of a file
+        (at(rpy=(0.02, 0.0, 0.7)), "3d", 3),
+        (at(rpy=(0.4, 0.0, 0.7)), "3d", 3),
+    ],
 )
 def test_a_spatial_loop_gets_what_its_frames_share(turn: pin.SE3, kind: str, rows: int) -> None:
     """A weld where the halves of a body meet, a hinge where one axis is shared, a point where none is."""
