@@ -128,3 +128,29 @@ def test_each_guard_of_a_step_keeps_a_motion_from_a_jump_by_itself(monkeypatch, 
     if alone != "drop":
         monkeypatch.setattr(branch, "_DROP", 0.0)
     assert [jumps(n) for n in (5, 17)] == [alone is None] * 2
+
+
+CHANGE_POINTS = [(0.5, 1.0, 0.5, 1.0), (0.5, 0.8, 0.5, 0.8), (0.2, 1.0, 0.2, 1.0)]
+
+
+def turned_once(chain: fb.ClosedChain, start: np.ndarray, n: int) -> fb.Trajectory:
+    crank = start[0] + np.linspace(0.0, 2.0 * np.pi, n)[:, None]
+    return fb.drive(chain, Motion(np.linspace(0.0, 1.0, n), crank, np.full((n, 1), 2.0 * np.pi), 0.0 * crank), start)
+
+
+@pytest.mark.parametrize("modes", [(0, 0), (0, 1), (1, 0), (1, 1)])
+@pytest.mark.parametrize(("first", "second"), [(0, 1), (2, 1), (0, 2)])
+def test_two_loops_that_lie_flat_together_are_not_taken_over_their_bifurcation(first, second, modes):
+    """Both determinants change their sign there, and so that of the whole does not."""
+    lengths = [CHANGE_POINTS[first], CHANGE_POINTS[second]]
+    chain, start = in_a_row(*lengths), assembled(lengths, 1.4, modes)
+    for n in (6, 23, 100):
+        with pytest.raises(SingularityError, match="type 2 singularity"):
+            turned_once(chain, start, n)
+
+
+@pytest.mark.parametrize("n", [6, 100])
+def test_two_loops_that_never_lie_flat_turn_as_often_as_asked(n):
+    lengths = [FIRST, (0.3, 1.0, 0.9, 1.1)]
+    path = turned_once(in_a_row(*lengths), assembled(lengths, 1.4, [0, 1]), n)
+    np.testing.assert_allclose(np.exp(1j * path.q[-1]), np.exp(1j * path.q[0]), rtol=0.0, atol=1e-9)
