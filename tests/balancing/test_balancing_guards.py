@@ -27,7 +27,7 @@ from fivebar_pin.balancing.variables.asked import material
 from fivebar_pin.balancing.variables.material import Bounds
 from fivebar_pin.balancing.variables.part import Placed
 from fivebar_pin.balancing.walk import ground
-from fivebar_pin.errors import SolverError, UnknownNameError
+from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
 
@@ -155,6 +155,13 @@ def test_bearings_that_only_springs_load_are_counted():
     still = fb.Motion(np.array([0.0, 1.0]), np.zeros((2, 1)), np.zeros((2, 1)), np.zeros((2, 1)))
     rows = measure(chain, [fb.drive(chain, still)], "bearing_force", about=np.zeros(3))
     assert rows.peak(chain.inertial_parameters) == pytest.approx(30.0 * 0.3)
+
+
+def test_a_trajectory_of_another_mechanism_measures_nothing():
+    _, path = balance_problems.moved("five_bar_case_I")
+    chain = mechanisms.four_bar()
+    with pytest.raises(InvalidInputError, match="must belong to this chain"):
+        measure(chain, [path], "shaking_force", about=np.zeros(3))
 
 
 @pytest.mark.parametrize(("value", "size"), [(1e-2, 1e-2), (1e-4, 4.0), (0.0, 4.0)])

@@ -107,6 +107,16 @@ def test_no_step_ends_where_round_off_would_show_in_the_velocity(before, ends):
     assert (reached_at(motion, FLAT - before) is not None) is ends
 
 
+@pytest.mark.parametrize(("off", "there"), [(0.0, False), (1e-9, False), (1e-3, True)])
+def test_there_is_no_rate_where_the_closures_lose_rank(off, there):
+    """The tangent space is any of several there; a step of which a stage falls on it must be taken otherwise."""
+    motion = motion_from(*on_its_way_flat())
+    xi, u = np.split(motion.start(), 2)
+    rate = motion.rate(FLAT + off, np.concatenate([xi + (FLAT + off) * u, u]))
+    assert np.isfinite(rate).all() == there
+    assert np.isnan(rate).all() != there
+
+
 def test_no_state_is_asked_for_beyond_the_end_when_a_singular_instant_lies_just_before():
     """A step over the instant would be as long after it as before; what acts may not be defined there."""
     chain, q, v = on_its_way_flat()
