@@ -165,10 +165,10 @@ def test_a_step_that_is_hardly_determined_anywhere_is_an_error(monkeypatch):
 
 
 def test_a_push_that_is_shorter_than_a_step_is_not_slept_through():
-    """A joint at rest is looked at eight times a step: 12 ms of 3 s above its friction break it loose."""
+    """A joint at rest is looked at eight times a step: 4 ms of 3 s above its friction break it loose."""
 
     def push(t: float, q: np.ndarray, v: np.ndarray) -> list[float]:
-        return [2.0 * np.exp(-(((t - 1.5) / 0.005) ** 2))]
+        return [2.0 * np.exp(-(((t - 1.508) / 0.0018) ** 2))]
 
     motion = fb.simulate(rod(pin.JointModelRZ(), friction=0.5), [0.0], [0.0], push, [0.0, 1.0, 3.0])
     assert abs(motion.q[1, 0]) < 1e-12
