@@ -49,13 +49,8 @@ class Placement(Immutable):
         """Return the pose for values of the parameters."""
         M = pin.SE3(np.array(self.base))
         for name, twist in self.moves:
-            M = M * _exponential(values[name] * twist)
+            M = M * pin.exp6(pin.Motion(values[name] * twist))
         return M
-
-
-def _exponential(twist: Array) -> pin.SE3:
-    """Return exp of a twist; a translation is one to the last digit."""
-    return pin.exp6(pin.Motion(twist)) if twist[3:].any() else pin.SE3(np.eye(3), twist[:3])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

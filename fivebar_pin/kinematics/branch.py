@@ -38,6 +38,7 @@ class _Node:
     bend: Array  # change of N per unit of the last step (np, na)
     sign: Array  # of the passive determinant, per group of closures
     tall: list[Array]  # passive Jacobians of the groups without a determinant (r, k)
+    several: list[Array]  # inverses of those of the groups of several closures that have one (k, k)
     sigma: float
 
 
@@ -50,6 +51,7 @@ class _Corrector:
     N: Array
     sign: Array  # per group of closures
     tall: list[Array]
+    several: list[Array]
     sigma: float
 
 
@@ -62,6 +64,7 @@ def _correct(loops: Loops, q: Array) -> _Corrector:
         passive.complement(here.blocks)[0],
         passive.sign[0],
         [A[0] for A in passive.tall],
+        [X[0] for g, X in zip(passive.groups, passive.X, strict=True) if g.is_square and len(g.members) > 1],
         float(passive.sigma[0]),
     )
 
@@ -69,7 +72,9 @@ def _correct(loops: Loops, q: Array) -> _Corrector:
 def node_at(loops: Loops, q: Array, x: Array) -> _Node:
     """Prepare a closed configuration q (nq,) with actuated coordinates x (na,)."""
     here = _correct(loops, q[None])
-    return _Node(np.array(x), np.array(q), here.N, np.zeros_like(here.N), here.sign, here.tall, here.sigma)
+    return _Node(
+        np.array(x), np.array(q), here.N, np.zeros_like(here.N), here.sign, here.tall, here.several, here.sigma
+    )
 
 
 def follow(loops: Loops, node: _Node, target: Array) -> _Node:
@@ -160,8 +165,10 @@ def _try(loops: Loops, node: _Node, x: Array) -> _Node | None:
         if np.any(here.sign != node.sign) or not here.sigma >= least or not same_side(node.tall, here.tall):
             return None
         if here.error < min(_GUIDED, _RESOLVED * here.sigma**2):
+            if _crossed_together(node.several, here.several):
+                return None
             bend = (here.N - node.N) / length if length > 0.0 else node.bend
-            return _Node(np.array(x), q[0], here.N, bend, here.sign, here.tall, here.sigma)
+            return _Node(np.array(x), q[0], here.N, bend, here.sign, here.tall, here.several, here.sigma)
         step = np.zeros(loops.tree.nv)
         step[loops.passive] = here.step
         correction += float(np.abs(step / scale).max())
@@ -169,6 +176,22 @@ def _try(loops: Loops, node: _Node, x: Array) -> _Node | None:
             return None
         q = loops.tree.integrate(q, step[None])
     return None
+
+
+def _crossed_together(before: list[Array], after: list[Array]) -> bool:
+    """Tell whether two loops passed a singularity in one step, which the sign of their common determinant hides.
+
+    (1 - s) A + s B is singular for some s between 0 and 1 where A^-1 B has a negative eigenvalue. Loops that act on
+    each other may mix two of them into a pair: those nearer to the negative axis than to any other count.
+
+    Args:
+        before, after: A^-1 and B^-1 of each group (k, k); scaling the rows of both does not change the eigenvalues.
+    """
+    for A, B in zip(before, after, strict=True):
+        values = np.linalg.eigvals(np.linalg.solve(B, A))
+        if np.any(np.abs(values.imag) < -values.real):
+            return True
+    return False
 
 
 def _fill(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array, tolerance: float) -> Closed:
@@ -212,7 +235,7 @@ def _mend(
             again = polish(loops, node.q[None])
             for name, values in parts.items():
                 values[k] = getattr(again, name)[0]
-        if b + 1 < index.size and _apart(loops, node.q, nodes[b + 1].q):
+        if b + 1 < index.size and _apart(loops, polish(loops, np.stack([node.q, nodes[b + 1].q])).q):
             raise _located(
                 BranchError(
                     "the motion passes another assembly mode between two samples; refine the motion",
@@ -248,8 +271,9 @@ def _between(loops: Loops, index: np.ndarray, nodes: list[_Node], X: Array) -> A
     return guess
 
 
-def _apart(loops: Loops, q0: Array, q1: Array) -> bool:
-    d = loops.tree.difference(q0[None], q1[None])[0] / loops.column_scale
+def _apart(loops: Loops, q: Array) -> bool:
+    """Tell whether two closed configurations (2, nq) are two; nodes themselves differ by what is left of their gaps."""
+    d = loops.tree.difference(q[:1], q[1:])[0] / loops.column_scale
     return bool(np.abs(d).max(initial=0.0) > _APART)
 
 

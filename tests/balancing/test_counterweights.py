@@ -487,3 +487,12 @@ def test_pieces_that_wander_are_held_until_they_rest() -> None:
         motions=motion_along(chain, None),
     )
     assert realise(design).attained
+
+
+def test_no_piece_sticks_out_of_its_region_even_by_round_off() -> None:
+    """Discs that fill their regions to the rim: they are looked for in a millionth less."""
+    chain, path = case_I()
+    design = balance(chain, "force", minimise="rms_torque", motions=path, region=Ball(0.07), counterweight=BARE)
+    made = realise(design).weights
+    assert max(np.linalg.norm(w.pose[:2, 3]) + w.radius for w in made) > 0.07 * (1.0 - 1e-5)
+    assert [w.overhang for w in made] == [0.0] * len(made)

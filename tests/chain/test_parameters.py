@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from pathlib import Path
 
+import mechanisms
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 import fivebar_pin as fb
 from fivebar_pin.chain import BarBody, Geometry, LumpBody, Placement, PlateBody
+from fivebar_pin.chain.bodies import axes_along
 from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.planar import Linkage
 
@@ -126,6 +128,42 @@ def test_a_link_cannot_be_cut_down_to_nothing() -> None:
         light.with_parameters(strut=0.05)
 
 
+def test_a_link_cannot_be_cut_down_to_exactly_nothing() -> None:
+    bar = arm(0.5, bodies=(BarBody(("start", "end"), 1.0),))
+    light = bar.with_inertias({"one": pin.Inertia(0.25, np.zeros(3), np.eye(3) * 1e-5)})
+    with pytest.raises(InvalidInputError, match=r"mass of the body of joint one = 0\.0 but must stay positive"):
+        light.with_parameters(l=0.25)
+
+
+def test_a_flat_lump_has_the_moments_of_a_lamina() -> None:
+    moments = LumpBody(("a",), 2.0, inertia_z=0.3).inertia(np.eye(4)[None]).inertia
+    np.testing.assert_allclose(moments, np.diag([0.15, 0.15, 0.3]), rtol=0.0, atol=1e-16)
+
+
+@pytest.mark.parametrize("along", [(1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
+def test_axes_along_a_direction_are_axes_whichever_it_is(along: tuple[float, float, float]) -> None:
+    axes = axes_along(np.array(along))
+    np.testing.assert_array_equal(axes[:, 0], along)
+    np.testing.assert_allclose(axes.T @ axes, np.eye(3), rtol=0.0, atol=1e-15)
+    assert np.linalg.det(axes) > 0.0
+
+
+def test_a_placement_from_a_base_comes_back_from_a_file(tmp_path: Path) -> None:
+    base = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.4, -0.5, 0.6])).homogeneous
+    there = Placement("stop", (("l", X),), base)
+    model = arm().model.copy()
+    mechanisms.point(model, 1, "stop", there.at({"l": 0.3}))
+    old = arm().geometry
+    chain = fb.ClosedChain(
+        model, (), ("one", "two"), "arm", geometry=Geometry(old.parameters, (*old.placements, there), old.bodies)
+    )
+    fb.save(chain, tmp_path, formats=("urdf",))
+    moved = fb.load(tmp_path / "arm.urdf").with_parameters(l=0.7)
+    np.testing.assert_allclose(
+        find(moved, "stop").placement.homogeneous, there.at({"l": 0.7}).homogeneous, rtol=0.0, atol=1e-15
+    )
+
+
 def test_a_saved_chain_keeps_its_parameters_to_the_last_digit(tmp_path: Path) -> None:
     other = CHAIN.with_parameters(coupler=0.4)
     fb.save(other, tmp_path)
@@ -194,6 +232,7 @@ def find(chain: fb.ClosedChain, frame: str) -> pin.Frame:
         (lambda: arm().with_parameters(l=np.inf), InvalidInputError, "parameter l = inf but must be finite"),
         (lambda: arm().with_parameters(l=0.0), InvalidInputError, "the bar would turn over"),
         (lambda: arm(at=0.31), InvalidInputError, "placement of two = .* lies that far from"),
+        (lambda: arm(at=0.3 + 1e-7), InvalidInputError, "placement of two = .* lies that far from"),
         (lambda: arm(lengths=("k",)), UnknownNameError, "parameter 'k'"),
         (lambda: arm(placements=(Placement("three", (("l", X),)),)), UnknownNameError, "joint or frame of a placement"),
         (lambda: arm(placements=(Placement("end", (("l", X),)),) * 2), InvalidInputError, "once"),
@@ -241,8 +280,11 @@ def test_a_plate_is_the_sum_of_the_triangles_it_is_cut_into() -> None:
 def test_plates_that_are_none_are_refused() -> None:
     with pytest.raises(InvalidInputError, match="make sides that cross"):
         PlateBody(("a", "b", "c", "d"), 1.0, 0.1).inertia(corners((0, 0), (1, 1), (1, 0), (0, 1)))
-    with pytest.raises(InvalidInputError, match="lie on one line"):
-        PlateBody(("a", "b", "c"), 1.0, 0.1).inertia(corners((0, 0), (1, 1), (2, 2)))
+    with pytest.raises(InvalidInputError, match="make sides that cross"):  # or touch
+        PlateBody(("a", "b", "c", "d"), 1.0, 0.1).inertia(corners((0, 0), (2, 0), (2, 1), (1, 0)))
+    for direction in (1.0, 1.0), (0.1, 0.3), (0.7, 0.1):  # round-off of such corners has an area
+        with pytest.raises(InvalidInputError, match="lie on one line"):
+            PlateBody(("a", "b", "c"), 1.0, 0.1).inertia(corners(*(tuple(k * np.array(direction)) for k in range(3))))
 
 
 @pytest.mark.parametrize(
@@ -257,6 +299,7 @@ def test_plates_that_are_none_are_refused() -> None:
         ("parameters: {values: {l: 1}, placements: {end: {base: [[1]]}}}", "base: has 1 entries; expected 4"),
         ("parameters: {values: {l: 1}, bodies: [{rod: [a, b]}]}", "must have one of the keys bar, lump, plate"),
         ("parameters: {values: {l: 1}, bodies: [{bar: [a, b]}]}", "linear_density is missing"),
+        ("parameters: {values: {l: 1}, bodies: [{bar: [a, b], lump: [a]}]}", "must have one of the keys bar, lump"),
         ("parameters: {values: {l: 1}, bodies: [{bar: [a, b], mass: 1}]}", "Unknown key 'mass'"),
         ("parameters: {values: {l: 1}, bodies: [{bar: [a], linear_density: 1}]}", "must be 2 different names"),
         ("parameters: {values: {l: 1}, placements: {nowhere: {moves: []}}}", "joint or frame of a placement"),

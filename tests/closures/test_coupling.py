@@ -338,15 +338,27 @@ def test_a_balanced_geared_five_bar_shakes_nothing():
     assert before.peak("shaking_force") > 1.0
 
 
+def test_ratios_are_those_of_their_joints_in_whatever_order_they_are_said():
+    one = fb.drive(pair(3.7), fb.motion.cycloidal(np.linspace(0.0, 1.0, 11), 0.3, 1.3))
+    chain = pair(3.7)
+    turned = fb.ClosedChain(chain.model, (Coupling({"b": 1.0, "a": 3.7}, 0.2, name="gear"),), ("a",))
+    other = fb.drive(turned, fb.motion.cycloidal(np.linspace(0.0, 1.0, 11), 0.3, 1.3))
+    np.testing.assert_array_equal(other.q, one.q)
+    loads = [fb.inverse_dynamics(c, path).torque for c, path in ((chain, one), (turned, other))]
+    np.testing.assert_array_equal(loads[1], loads[0])
+    assert loops_of(turned).anchored[0].tied == (1, 2)
+
+
 @HINGES
 def test_joints_of_a_coupling_count_their_turns(joint):
     """A joint of cosine and sine becomes a revolute one about the same axis; the rest of the model stays."""
     free = five_bar(base=TILTED, joint=joint).model
-    free.referenceConfigurations["home"] = pin.integrate(free, pin.neutral(free), np.array([0.3, -0.4, 2.0, 0.1]))
+    free.referenceConfigurations["home"] = pin.integrate(free, pin.neutral(free), np.array([-0.3, -0.4, -2.0, 0.1]))
     for k, word in enumerate(OF_VELOCITY):
         setattr(free, word, 0.1 + k + 0.1 * np.arange(4.0))
     passive = free.idx_qs[2]
     free.lowerPositionLimit[passive], free.upperPositionLimit[passive] = -0.7, 0.8
+    free.positionLimitMargin[passive] = 0.05
     before = free.nq
     chain = fb.ClosedChain(free, (Coupling({"left": 1.0, "right": 2.0}),), ())
     assert free.nq == before and chain.nq == (4 if joint is pin.JointModelRZ else 6)
@@ -357,7 +369,7 @@ def test_joints_of_a_coupling_count_their_turns(joint):
     torque = [pin.rnea(m, m.createData(), q, v, a) for m, q in ((free, one), (model, two))]
     np.testing.assert_allclose(torque[1], torque[0], rtol=0.0, atol=1e-12)
     home = pin.difference(model, pin.neutral(model), chain.references["home"])
-    np.testing.assert_allclose(home, [0.3, -0.4, 2.0, 0.1], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(home, [-0.3, -0.4, -2.0, 0.1], rtol=0.0, atol=1e-12)
     assert [f.name for f in model.frames] == [f.name for f in free.frames]
     assert [f.placement for f in model.frames] == [f.placement for f in free.frames]
     assert [f.parentJoint for f in model.frames] == [f.parentJoint for f in free.frames]
@@ -365,9 +377,11 @@ def test_joints_of_a_coupling_count_their_turns(joint):
         np.testing.assert_array_equal(getattr(model, word), getattr(free, word), err_msg=word)
     kept = model.idx_qs[2]
     assert (model.lowerPositionLimit[kept], model.upperPositionLimit[kept]) == (-0.7, 0.8)
+    assert model.positionLimitMargin[kept] == 0.05
     assert model.gravity == free.gravity and model.name == free.name
     oblique = pin.buildModelFromXML(OBLIQUE)
     load = pin.Inertia(2.0, np.array([0.1, 0.2, 0.3]), np.eye(3))  # frames remember what was fixed to them
+    oblique.inertias[0] = load  # as a file may say of the ground
     oblique.addFrame(pin.Frame("load", 1, 0, pin.SE3.Identity(), pin.FrameType.BODY, load))
     turned = fb.ClosedChain(oblique, (Coupling({"j": 1.0}),), ()).model
     x = 2.3
@@ -568,6 +582,11 @@ def test_mujoco_and_we_read_the_same_rod(tmp_path: Path):
             "ties a spatial tendon to another; only fixed ones",
         ),
         ('<tendon><fixed name="t" damping="2"><joint joint="a" coef="1"/></fixed></tendon>', "damping of a tendon"),
+        (
+            '<equality><connect name="h" site1="s3" site2="s4"/></equality>'
+            '<custom><numeric name="revolute closure h" data="0 0 1"/></custom>',
+            "is marked as a hinge but lacks its second connect 'h axis'",
+        ),
         ('<equality><flex name="f"/></equality>', "Unknown equality 'flex'; known: connect, joint, tendon, weld"),
     ],
 )

@@ -9,6 +9,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin.mechanism import manifold
 from fivebar_pin.mechanism.closing import Limits, closed_enough, iterate, polish, residual_of, search
+from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.manifold import ROUND_OFF, manifold_of
 from fivebar_pin.mechanism.mobility import close_all
@@ -149,3 +150,21 @@ def test_round_off_far_from_the_origin_ends_an_iteration_too():
         ends.append(float(np.abs(reached.reduced).max()))
     assert max(ends) > ROUND_OFF  # else the rule was not needed
     assert max(ends) < 1e-13
+
+
+def test_a_sample_that_is_thrown_far_away_is_left_there():
+    """An open start where the passive columns are all but singular: its first step leads off, and none follows."""
+    loops, low, high = loops_of(mechanisms.parallelogram()), -1.0, 1.0
+
+    def start(rocker: float) -> Configurations:
+        return Configurations(loops, np.array([[0.3, 0.9, rocker]]))
+
+    assert start(low).passive.sign != start(high).passive.sign
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if start(middle).passive.sign == start(low).passive.sign else (low, middle)
+    step = start(low).passive.solve(start(low).residual)[0]
+    assert np.abs(step).max() > 1e4
+    found = polish(loops, start(low).q)
+    assert found.correction[0] == pytest.approx(np.abs(step).max(), rel=1e-12)
+    assert found.residual[0] > 1e-3

@@ -122,3 +122,12 @@ def test_a_gantry_has_the_conditions_of_its_two_masses_in_the_plane():
     assert (
         fb.balance_conditions(gantry(), "force").rank == fb.balance_conditions(gantry(base=TILTED), "force").rank == 2
     )
+
+
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize(("advance", "planar"), [(0.5, True), (2.0, False)])
+def test_a_screw_leaves_the_plane_by_its_advance_over_the_length_of_the_chain(length, advance, planar):
+    """What a turn lifts out of the plane is judged like the tilt of an axis, whatever the unit of length."""
+    S = np.zeros((1, 6, 1))
+    S[0, 2, 0], S[0, 5, 0] = advance * PARALLEL * length, 1.0
+    assert (plane_normal(S, length) is not None) is planar

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from fivebar_pin import paper
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, SolverError
 from fivebar_pin.motion import Motion
+from fivebar_pin.paper import optimum
 from fivebar_pin.paper.audit import READINGS
-from fivebar_pin.paper.polar import Problem
+from fivebar_pin.paper.polar import Problem, climb
 from fivebar_pin.paper.rings import common_points
+from fivebar_pin.paper.starts import balanced_points
 
 CASE_I = paper.table_1("I", "balanced")
 OPTIMUM = paper.balance_mass_centres(CASE_I)
@@ -342,3 +344,30 @@ def test_masses_that_cannot_add_up_to_the_total_are_infeasible(bounds):
     """Four links of at most 50 g are never 0.4 kg, four of at least 200 g are more."""
     with pytest.raises(InfeasibleError, match=r"never to the total mass of 0\.4 kg"):
         paper.balance_masses(paper.table_1("I", "balanced"), mass_bounds=bounds, total_mass=0.4)
+
+
+def stationary_points():
+    """Return the problem of case I, its starts and the points that they lead to, the best one first."""
+    mu = CASE_I.mass_ratios
+    problem = optimum._problem((0.5, 0.5), None, (mu, mu))
+    starts = balanced_points(problem, mu, each=1)
+    points = sorted((climb(problem, x) for x in starts), key=lambda p: problem.objective(p.x))
+    return problem, starts, points
+
+
+def test_a_stationary_point_that_is_no_minimum_is_not_returned():
+    """However well the conditions hold there: along a direction of negative curvature it gets better."""
+    problem, starts, points = stationary_points()
+    best = points[0]
+    saddle = replace(best, curvature=-1e-3)
+    assert optimum._best(CASE_I, problem, starts, [replace(best, curvature=-1e-12)], 1e-9).reached == 1
+    with pytest.raises(SolverError, match=r"None of .* starts reached a minimum"):
+        optimum._best(CASE_I, problem, starts, [saddle], 1e-9)
+
+
+def test_a_minimum_that_is_worse_than_a_balanced_linkage_that_is_known_is_not_the_optimum():
+    problem, starts, points = stationary_points()
+    worse = max(starts, key=problem.objective)
+    assert problem.objective(worse) > problem.objective(points[0].x) + 1e-6
+    with pytest.raises(SolverError, match="the search missed a minimum"):
+        optimum._best(CASE_I, problem, [points[0].x], [replace(points[0], x=worse)], 1e-9)

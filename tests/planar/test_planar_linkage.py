@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 import fivebar_pin as fb
 from fivebar_pin.errors import AssemblyError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.planar import Linkage
+from fivebar_pin.planar._parts import Link, Motor
+from fivebar_pin.planar._tree import spanning_tree
 from fivebar_pin.shipped import mechanisms
 
 
@@ -261,6 +263,43 @@ def test_a_linkage_without_a_motor_is_told_what_could_be_driven() -> None:
     with pytest.raises(InvalidInputError, match=r"number of motors = 0 but must be 1.*crank at A") as caught:
         plain().chain()
     assert caught.value.value == 0
+    assert str(caught.value).count("; or ") == 2, "each of the three joints of the tree would do"
+
+
+def test_a_linkage_of_kilometres_is_closed_as_far_as_its_coordinates_are_exact() -> None:
+    made = Linkage("large")
+    made.points(A=(0.0, 0.0), B=(1e6 / 3.0, 0.0), C=(1e5 / 7.0, 1e6 / 9.0), D=(1e6 / 3.3, 1e6 / 5.1))
+    made.ground("A", "B")
+    for name, ends in {"crank": "AC", "coupler": "CD", "rocker": "BD"}.items():
+        made.bar(name, *ends)
+    made.motor("crank", at="A")
+    chain = made.chain()
+    assert np.abs(fb.closure_residual(chain, chain.references["home"])).max() <= 1e-12 * chain.length
+
+
+def test_angles_at_home_are_those_of_less_than_half_a_turn() -> None:
+    """A crank at 170 degrees and a coupler at -170: one turns by 20 against the other, not by -340."""
+    made = Linkage("turned")
+    crank, coupler = (np.exp(1j * np.radians(angle)) for angle in (170.0, -170.0))
+    end = crank + 2.0 * coupler
+    made.points(A=(0.0, 0.0), B=(-2.0, -2.0), C=(crank.real, crank.imag), D=(end.real, end.imag))
+    made.ground("A", "B")
+    for name, ends in {"crank": "AC", "coupler": "CD", "rocker": "BD"}.items():
+        made.bar(name, *ends)
+    made.motor("crank", at="A")
+    chain = made.chain()
+    home = dict(zip(chain.joints, np.degrees(chain.references["home"]), strict=True))
+    assert home["crank"] == pytest.approx(170.0) and home["coupler"] == pytest.approx(20.0)
+
+
+def test_a_link_hangs_on_the_neighbour_that_is_nearest_to_the_ground() -> None:
+    """Driven joints come first, and so `far` is in the tree before `near`; `tip` hangs on `near` all the same."""
+    links = [("ground", "OP"), ("crank", "OA"), ("far", "AB"), ("near", "PX"), ("tip", "BX")]
+    made = {name: Link(name, tuple(points)) for name, points in links}
+    motors = [Motor("crank", "O", "ground"), Motor("far", "A", "crank")]
+    tree = spanning_tree("nearest", made, motors)
+    assert {e.child: e.parent for e in tree.edges}["tip"] == "near"
+    assert [(cut.first, cut.second, cut.at) for cut in tree.cuts] == [("far", "tip", "B")]
 
 
 def test_too_many_motors_are_counted_against_the_mobility() -> None:

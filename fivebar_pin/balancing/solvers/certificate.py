@@ -92,9 +92,10 @@ def _violation(program: Program, z: Array) -> float:
 
 
 def polished(program: Program, z: Array, g: Array) -> Array:
-    """Return a dual ray moved onto G^T z = 0, with g.z = -1."""
+    """Return a dual ray moved onto G^T z = 0, with g.z = -1; zero where nothing of it is left."""
     z = stationary(program, z / -float(g @ z), np.zeros(program.n))
-    return np.asarray(z / -float(g @ z))
+    against = -float(g @ z)
+    return np.asarray(z / against) if against else np.zeros_like(z)
 
 
 def _conflict(program: Program, z: Array, g: Array) -> dict[str, float]:
