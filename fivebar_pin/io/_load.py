@@ -112,6 +112,11 @@ def mechanism_file(path: Path) -> Path:
     if not exists:
         raise FileFormatError(path, "there is no such file or folder")
     if not is_folder:
+        if path.suffix.lower() in (".yaml", ".yml"):
+            rule = (
+                "is no linkage file: it does not state linkage: NAME. A sidecar is read with its tree: name the .urdf"
+            )
+            raise FileFormatError(path, rule)
         if path.suffix.lower() not in (".urdf", ".xml"):
             raise FileFormatError(path, "has an unknown ending; expected a .urdf or MJCF .xml file, or a folder")
         return path
