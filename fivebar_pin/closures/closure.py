@@ -231,7 +231,7 @@ class Closure(Immutable, metaclass=_Family):
 
 
 def _shorthand(
-    frames: Iterable[str], kind: object = "3d", axis: npt.ArrayLike | None = None, name: str = "", **values: Any
+    frames: Iterable[str] = (), kind: object = "3d", axis: npt.ArrayLike | None = None, name: str = "", **values: Any
 ) -> Closure:
     """See `Closure`."""
     member = Closure.of_kind(kind)

@@ -191,6 +191,7 @@ def find(chain: fb.ClosedChain, frame: str) -> pin.Frame:
     ("make", "kind", "message"),
     [
         (lambda: arm().with_parameters(k=1.0), UnknownNameError, "parameter 'k'; known: l, alpha"),
+        (lambda: arm().with_parameters([("l", 1.0)]), InvalidInputError, "must map names to numbers"),
         (lambda: arm().with_parameters(l=np.inf), InvalidInputError, "parameter l = inf but must be finite"),
         (lambda: arm().with_parameters(l=0.0), InvalidInputError, "the bar would turn over"),
         (lambda: arm(at=0.31), InvalidInputError, "placement of two = .* lies that far from"),

@@ -232,6 +232,8 @@ def test_closures_reject_what_they_cannot_be():
         fb.Closure(("a",))  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="must be two frame names"):
         fb.Closure("ab")  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="must be two frame names"):
+        fb.Closure()
     with pytest.raises(
         UnknownNameError, match=r"Unknown closure kind '4d'; known: 3d, 6d, coupling, cylindrical, distance, revolute"
     ):
