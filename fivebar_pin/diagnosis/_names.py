@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from fivebar_pin.diagnosis._ends import End, Evidence, Pair
 
@@ -47,13 +47,18 @@ def _side(word: str) -> int:
     return int(word in ("b", "2", "second", "child", "end"))
 
 
-def point_pairs(ends: Iterable[End]) -> Iterator[Pair]:
-    """Yield the markers that name one point of a drawing on two bodies, like B_coupler and B_rocker."""
+def point_pairs(ends: Iterable[End], meet: Callable[[End, End], bool]) -> Iterator[Pair]:
+    """Yield the markers that name one point of a drawing on two bodies, like B_coupler and B_rocker.
+
+    On more bodies the point may be a pin of several bars, or one point of several like legs: where they meet decides.
+    """
     points: dict[str, list[End]] = {}
     for end in ends:
         said = _POINT.fullmatch(end.name)
         if end.is_marker and said:
             points.setdefault(said.group(1), []).append(end)
     for label, there in points.items():
-        if len(there) == 2 and there[0].joint != there[1].joint:
-            yield Pair((there[0], there[1]), Evidence.POINT, label)
+        first, *others = there
+        for k, other in enumerate(others):
+            if other.joint != first.joint and (len(others) == 1 or meet(first, other)):
+                yield Pair((first, other), Evidence.POINT, label if k == 0 else f"{label}_{k + 1}")
