@@ -209,6 +209,13 @@ def _mimics(tree: TreeEntry, sidecar: Sidecar) -> tuple[Closure, ...]:
     return tuple(j.mimic for j in moving if j.mimic is not None)
 
 
+def stated_couplings(urdf: Path, *, max_bytes: int = MAX_BYTES) -> tuple[tuple[Closure, ...], tuple[Closure, ...]]:
+    """Return the couplings of joints that a URDF states as <mimic>, and those of the sidecar beside it."""
+    beside = sidecar_file(urdf)
+    sidecar = Sidecar() if beside is None else read_sidecar(beside)
+    return _mimics(read_urdf(urdf, max_bytes=max_bytes), sidecar), tuple(c for c in sidecar.closures if c.counted)
+
+
 def _counting(tree: TreeEntry, closures: tuple[Closure, ...]) -> TreeEntry:
     """Return the tree with the continuous joints of couplings counting their turns: revolute, without limits."""
     joints = dict(tree.joints)
