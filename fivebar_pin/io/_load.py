@@ -112,10 +112,10 @@ def mechanism_file(path: Path) -> Path:
     if not exists:
         raise FileFormatError(path, "there is no such file or folder")
     if not is_folder:
+        if is_linkage_file(path):
+            raise FileFormatError(path, "is a linkage file, not a tree: its points close its loops; `fb.load` reads it")
         if path.suffix.lower() in (".yaml", ".yml"):
-            rule = (
-                "is no linkage file: it does not state linkage: NAME. A sidecar is read with its tree: name the .urdf"
-            )
+            rule = "is no linkage file, which states linkage: NAME, and a sidecar is read with its tree: name the .urdf"
             raise FileFormatError(path, rule)
         if path.suffix.lower() not in (".urdf", ".xml"):
             raise FileFormatError(path, "has an unknown ending; expected a .urdf or MJCF .xml file, or a folder")

@@ -189,3 +189,6 @@ def test_only_a_urdf_can_be_closed(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "is no .urdf file; a sidecar closes the loops of a URDF only" in capsys.readouterr().err
     assert main(["close", str(tmp_path / "none.urdf")]) == 1
     assert "there is no such file or folder" in capsys.readouterr().err
+    assert main(["new", "four-bar", "--out", str(tmp_path / "mine.yaml")]) == 0
+    assert main(["close", str(tmp_path / "mine.yaml")]) == 1
+    assert "is a linkage file, not a tree: its points close its loops" in capsys.readouterr().err

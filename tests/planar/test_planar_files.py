@@ -77,7 +77,7 @@ def test_a_linkage_file_loads_like_any_mechanism(tmp_path: Path) -> None:
 
 def test_other_yaml_is_not_taken_for_a_linkage(tmp_path: Path) -> None:
     fb.save(load_text(tmp_path, GOOD).chain(), tmp_path / "out", formats=("urdf",))
-    with pytest.raises(FileFormatError, match=r"is no linkage file: .* name the .urdf"):
+    with pytest.raises(FileFormatError, match=r"is no linkage file, .* name the .urdf"):
         fb.load(tmp_path / "out" / "four.yaml")
     with pytest.raises(FileFormatError, match="is no linkage file: it needs the key linkage"):
         load(tmp_path / "out" / "four.yaml")
