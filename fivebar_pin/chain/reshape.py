@@ -116,8 +116,10 @@ def _follow_bodies(before: pin.Model, after: pin.Model, bodies: Iterable[_Body])
             continue
         pi = present.toDynamicParameters() + new.toDynamicParameters() - old.toDynamicParameters()
         if not pi[0] > 0.0:
-            name = f"mass of the body of joint {after.names[j]}"
-            raise InvalidInputError(name, float(pi[0]), "must stay positive [kg]", "Cut off less.")
+            name, weight = f"mass of the body of joint {after.names[j]}", old.toDynamicParameters()[0]
+            rule = f"must stay positive [kg]: the link weighs {present.mass:.4g} kg, what it is said to be made of"
+            way = "Cut off less, or give the model the inertias of its bodies."
+            raise InvalidInputError(name, float(pi[0]), f"{rule} {weight:.4g} kg", way)
         after.inertias[j] = pin.Inertia.FromDynamicParameters(pi)
 
 
