@@ -194,7 +194,7 @@ class ClosedChain(Immutable):
 
         Raises:
             UnknownNameError: no such parameter; lists those there are.
-            InvalidInputError: not a finite number, a length that is not positive, or a body cut down to nothing.
+            InvalidInputError: not a finite number, a length that is not positive, or a body cut down to nothing real.
         """
         if not isinstance(values, Mapping | None):
             raise InvalidInputError("parameters", values, "must map names to numbers, as {'crank': 0.1}")

@@ -128,6 +128,31 @@ def test_a_link_cannot_be_cut_down_to_nothing() -> None:
         light.with_parameters(strut=0.05)
 
 
+def test_a_link_that_was_made_lighter_cannot_be_cut_down_to_moments_that_no_body_has() -> None:
+    """A point of the strut's mass has none of its moment of inertia: a shorter strut would have less than none."""
+    strut = CHAIN.model.inertias[CHAIN.model.getJointId("strut")]
+    point = CHAIN.with_inertias({"strut": pin.Inertia(strut.mass, strut.lever, np.eye(3) * 1e-9)})
+    with pytest.raises(InvalidInputError, match=r"moments of inertia of the body of joint strut = .* Cut off less"):
+        point.with_parameters(strut=0.8 * VALUES["strut"])
+    longer = point.with_parameters(strut=1.2 * VALUES["strut"])
+    assert np.linalg.eigvalsh(longer.model.inertias[CHAIN.model.getJointId("strut")].inertia).min() > 0.0
+
+
+def test_points_of_mass_may_move_onto_each_other() -> None:
+    """Their moment of inertia about the mass centre is round-off then, of either sign."""
+    made = fb.planar.Linkage("pendulum")
+    made.ground(A=(0, 0))
+    made.points(B=(0.3, 0.4))
+    made.bar("rod", "A", "B", density=0.0)
+    made.mass("rod", at="B", mass=0.3)
+    made.motor("rod", at="A")
+    pendulum = made.chain()
+    for length in np.linspace(0.1, 0.4, 31):
+        tip = pin.Inertia(0.1, np.array([length, 0.0, 0.0]), np.zeros((3, 3)))
+        heavy = pendulum.with_inertias({"rod": pendulum.model.inertias[1] + tip})
+        assert heavy.with_parameters(rod=length).mass == pytest.approx(0.4)
+
+
 def test_a_saved_chain_keeps_its_parameters_to_the_last_digit(tmp_path: Path) -> None:
     other = CHAIN.with_parameters(coupler=0.4)
     fb.save(other, tmp_path)
