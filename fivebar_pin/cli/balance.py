@@ -47,6 +47,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     """Add the commands to the parser."""
     conditions = commands.add_parser("conditions", help="the balancing conditions of a mechanism")
     _common(conditions)
+    _branch(conditions)
     conditions.set_defaults(run=run_conditions)
     balance = commands.add_parser(
         "balance",
@@ -85,7 +86,8 @@ def run_conditions(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import balance_conditions
 
     chain = load_any(chosen.path, chosen.gravity)
-    conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen, chain))
+    near = motion_along(chain, chosen.motion).q[0] if chosen.branch == "motion" else None
+    conditions = balance_conditions(chain, chosen.kind, gravity=_direction(chosen, chain), near=near)
     console = _tables.console()
     console.print(str(conditions), markup=False, soft_wrap=True)
     residual = float(np.abs(conditions.residual(chain)).max(initial=0.0))
@@ -179,10 +181,14 @@ def _designing(parser: argparse.ArgumentParser) -> None:
         "--material", default="steel", help="nothing is denser: a name, kg/m3, or 'none' for points of mass [steel]"
     )
     parser.add_argument("--thickness", type=float, help="of flat material [m] [a fifth of the mechanism's length]")
-    parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
     parser.add_argument(
         "--solver", choices=_SOLVERS, metavar="NAME", help="of the conic program: %(choices)s [the first of them]"
     )
+    _branch(parser)
+
+
+def _branch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
     parser.add_argument(
         "--branch",
         choices=("all", "motion"),
