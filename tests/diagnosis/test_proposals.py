@@ -317,6 +317,17 @@ def test_points_of_three_bodies_that_do_not_meet_are_not_one_pin() -> None:
     assert chosen(proposals) == {frozenset(("P_one", "P_two")): "3d"}
 
 
+def test_one_point_of_a_left_and_a_right_leg_is_no_loop_unless_they_meet() -> None:
+    """S_left and S_right are two soles; the loops are where frames coincide. P_left and P_right may be a five-bar's."""
+    bars = [(0, Z(), at()), (1, Z(), at(x=0.4)), (0, Z(), at(x=1.0)), (3, Z(), at(x=-0.4))]
+    for one, other in (("S_left", "S_right"), ("S_fl", "S_fr"), ("S1_leftfoot", "S1_rightfoot")):
+        marks = {one: (2, at(x=0.1)), other: (4, at(x=0.1)), "u": (2, at(0.2)), "v": (4, at())}
+        (proposal,) = [p for p in propose_closures(branches(*bars, marks=marks)) if p.chosen]
+        assert proposal.evidence is not Evidence.POINT and set(proposal.closure.frames) == {"u", "v"}
+    meeting = branches(*bars, marks={"P_left": (2, at(x=0.2, y=0.3)), "P_right": (4, at(x=0.0, y=0.3))})
+    assert chosen(propose_closures(meeting)) == {frozenset(("P_left", "P_right")): "3d"}
+
+
 def test_a_third_bar_on_a_pin_that_goes_on_to_another_loop_is_pinned_not_welded() -> None:
     """Jansen's leg has such pins: the bar hangs on its hinge at the pin, and its other end belongs to a loop too."""
     made = fb.planar.Linkage("leg")
