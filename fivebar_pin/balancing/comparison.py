@@ -72,6 +72,8 @@ def compare(
     Raises:
         InvalidInputError: no mechanism, or mechanisms with different bodies.
     """
+    if not isinstance(chains, Mapping):
+        raise InvalidInputError("chains", type(chains).__name__, "must map names to mechanisms or designs")
     made = {name: item.chain if isinstance(item, Design) else item for name, item in chains.items()}
     if not made:
         raise InvalidInputError("chains", {}, "must hold at least one mechanism")

@@ -83,9 +83,10 @@ class BalanceConditions(Immutable):
 
     def __repr__(self) -> str:
         where = "planar" if self.space.planar else "spatial"
+        modes = "in all assembly modes" if self.near is None else "on one branch"
         return (
             f"BalanceConditions({self.chain.name!r}, {self.kind}: rank {self.rank} of {self.basis.shape[1]} {where} "
-            f"parameters, gap {self.gap:.1e}{', impossible with these springs' if self.unheld else ''})"
+            f"parameters {modes}, gap {self.gap:.1e}{', impossible with these springs' if self.unheld else ''})"
         )
 
     def __str__(self) -> str:

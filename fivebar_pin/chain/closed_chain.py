@@ -78,9 +78,10 @@ class ClosedChain(Immutable):
     def __repr__(self) -> str:
         closures = ", ".join(f"{c.name} ({c.kind})" for c in self.closures) or "none"
         springs = f"; springs: {', '.join(s.name for s in self.springs)}" if self.springs else ""
+        parameters = f"; parameters: {', '.join(self.parameters)}" if self.parameters else ""
         return (
             f"ClosedChain({self.name!r}: {self.model.njoints - 1} joints, nq = {self.nq}, nv = {self.nv}; "
-            f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'}{springs})"
+            f"closures: {closures}; actuated: {', '.join(self.actuated) or 'none'}{springs}{parameters})"
         )
 
     @property
@@ -193,8 +194,10 @@ class ClosedChain(Immutable):
 
         Raises:
             UnknownNameError: no such parameter; lists those there are.
-            InvalidInputError: not a finite number, a length that is not positive, or a body cut down to nothing.
+            InvalidInputError: not a finite number, a length that is not positive, or a body cut down to nothing real.
         """
+        if not isinstance(values, Mapping | None):
+            raise InvalidInputError("parameters", values, "must map names to numbers, as {'crank': 0.1}")
         geometry = self.geometry.with_values({**(values or {}), **named})
         model, visuals = reshaped(self.model, self.visuals, geometry)
         return replace(self, model=model, visuals=visuals, geometry=geometry)

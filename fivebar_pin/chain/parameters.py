@@ -24,6 +24,9 @@ from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["Geometry", "Placement"]
 
+_RIGID = 1e-9
+"""How far a rotation may be from orthonormal: written with ten digits and read back [-]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement(Immutable):
@@ -41,9 +44,15 @@ class Placement(Immutable):
 
     def __post_init__(self) -> None:
         what = f"placement of {self.name}"
+        if not all(isinstance(move, tuple | list) and len(move) == 2 for move in self.moves):
+            raise InvalidInputError(f"moves of the {what}", self.moves, "must be pairs of a parameter and its twist")
         moves = tuple((str(name), checked(f"twist of {name} in the {what}", twist, (6,))) for name, twist in self.moves)
         object.__setattr__(self, "moves", moves)
-        object.__setattr__(self, "base", checked(f"base of the {what}", self.base, (4, 4)))
+        base = checked(f"base of the {what}", self.base, (4, 4))
+        R = base[:3, :3]
+        if np.abs(R.T @ R - np.eye(3)).max() > _RIGID or np.linalg.det(R) < 0.0 or (base[3] != np.eye(4)[3]).any():
+            raise InvalidInputError(f"base of the {what}", base.tolist(), "must be a rotation and a translation")
+        object.__setattr__(self, "base", base)
 
     def at(self, values: Mapping[str, float]) -> pin.SE3:
         """Return the pose for values of the parameters."""
@@ -60,7 +69,8 @@ class Geometry(Immutable):
     Attributes:
         parameters: value by name [m or rad]; read-only.
         placements: of joints and frames, each named once.
-        bodies: rules of what the links are made of; what a link carries beside them stays in place on it.
+        bodies: rules of what the links are made of; the model's inertias hold them already, and what a link carries
+            beside them stays in place on it.
         lengths: names of parameters that have to stay positive: a bar would turn over.
     """
 

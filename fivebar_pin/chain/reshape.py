@@ -18,6 +18,8 @@ from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["put_in_place", "reshaped", "with_bodies"]
 
+_REAL = 1e-9
+"""How far moments of inertia may break the triangle inequality, as part of those about the joint: round-off [-]."""
 _SAME = 1e-9
 """Difference of placements up to which they are the same one, written and read back [m, -]."""
 
@@ -114,11 +116,25 @@ def _follow_bodies(before: pin.Model, after: pin.Model, bodies: Iterable[_Body])
         if present == old:
             after.inertias[j] = new
             continue
-        pi = present.toDynamicParameters() + new.toDynamicParameters() - old.toDynamicParameters()
+        parts = np.stack([inertia.toDynamicParameters() for inertia in (present, new, old)])
+        pi = parts[0] + parts[1] - parts[2]
         if not pi[0] > 0.0:
-            name = f"mass of the body of joint {after.names[j]}"
-            raise InvalidInputError(name, float(pi[0]), "must stay positive [kg]", "Cut off less.")
+            name, weight = f"mass of the body of joint {after.names[j]}", parts[2, 0]
+            rule = f"must stay positive [kg]: the link weighs {present.mass:.4g} kg, what it is said to be made of"
+            way = "Cut off less, or give the model the inertias of its bodies."
+            raise InvalidInputError(name, float(pi[0]), f"{rule} {weight:.4g} kg", way)
         after.inertias[j] = pin.Inertia.FromDynamicParameters(pi)
+        if _lacks(after.inertias[j]) > max(_lacks(present), _REAL * np.abs(parts[:, 4:]).max()):
+            moments = np.linalg.eigvalsh(after.inertias[j].inertia).tolist()
+            rule = "must be those of a body [kg m2]: the link has less of it than what it is said to be made of"
+            way = "Cut off less, or change lengths before masses."
+            raise InvalidInputError(f"moments of inertia of the body of joint {after.names[j]}", moments, rule, way)
+
+
+def _lacks(inertia: pin.Inertia) -> float:
+    """Return by how much the largest principal moment exceeds the sum of the others [kg m2]."""
+    moments = np.linalg.eigvalsh(inertia.inertia)
+    return float(moments[2] - moments[0] - moments[1])
 
 
 def _follow_visuals(

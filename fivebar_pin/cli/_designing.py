@@ -63,15 +63,17 @@ def add_designing(parser: argparse.ArgumentParser) -> None:
         "--material", default="steel", help="nothing is denser: a name, kg/m3, or 'none' for points of mass [steel]"
     )
     parser.add_argument("--thickness", type=float, help="of flat material [m] [a fifth of the mechanism's length]")
-    parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
     parser.add_argument(
         "--solver", choices=_SOLVERS, metavar="NAME", help="of the conic program: %(choices)s [the first of them]"
     )
+    add_branch(parser)
+
+
+def add_branch(parser: argparse.ArgumentParser) -> None:
+    """Add the motion, and whether its assembly mode alone is meant."""
+    parser.add_argument("--motion", metavar="CSV", help="motion of the actuated joints; unless given, they sway")
     parser.add_argument(
-        "--branch",
-        choices=("all", "motion"),
-        default="all",
-        help="assembly modes: all, or the motion's [all]",
+        "--branch", choices=("all", "motion"), default="all", help="assembly modes: all, or the motion's [all]"
     )
 
 

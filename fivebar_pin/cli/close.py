@@ -18,6 +18,7 @@ from fivebar_pin.errors import FileFormatError, InvalidInputError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from fivebar_pin.closures import Closure
     from fivebar_pin.diagnosis import Diagnosis, Proposal
 
 _MOST_LEFT = 12
@@ -38,7 +39,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "coincide; write the closures and motors as the sidecar beside the URDF. Exit code 1 when nothing is found, "
         "or when check would refuse what is written.",
     )
-    parser.add_argument("path", help="URDF file, or a folder with one; what a sidecar beside it says besides is kept")
+    parser.add_argument("path", help="URDF file, or a folder with one; couplings and what else a sidecar says are kept")
     parser.add_argument("--out", metavar="PATH", help="sidecar to write; the URDF's name ending in .yaml unless given")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing sidecar")
     parser.add_argument(
@@ -56,21 +57,24 @@ def run(chosen: argparse.Namespace) -> int:
     """Propose, print and write."""
     from fivebar_pin import io
     from fivebar_pin.diagnosis import diagnose, propose_closures, propose_motors
-    from fivebar_pin.io._load import sidecar_file
+    from fivebar_pin.io._load import sidecar_file, stated_couplings
 
     urdf = _urdf(chosen.path)
     there = sidecar_file(urdf)
     file = as_path(chosen.out) if chosen.out is not None else there or urdf.with_suffix(".yaml")
     if not chosen.dry_run:
         check_new(file, overwrite=chosen.overwrite)
-    chain = io.load(urdf, closures=(), actuated=())
+    mimics, gears = stated_couplings(urdf)
+    chain = io.load(urdf, closures=(*gears, *mimics), actuated=())
     console = _tables.console()
     proposals = propose_closures(chain, pairs=[(a, b) for a, b in chosen.pair], kind=chosen.kind)
     _closures_table(console, chain, proposals)
     closures = tuple(p.closure for p in proposals if p.chosen)
-    if not closures:
+    if not closures and not chain.closures:
         raise _nothing(chain, proposals)
-    closed = replace(chain, closures=closures)
+    closed = replace(chain, closures=(*gears, *closures, *mimics))
+    if chain.closures:
+        console.print(f"couplings that are stated already: {', '.join(c.name for c in chain.closures)}", soft_wrap=True)
     motors = {name: "given" for name in chosen.motor} or {m.joint: m.reason for m in propose_motors(closed)}
     closed = closed.with_actuated(motors)
     _tables.table(console, "motors", ("joint", "why"), list(motors.items()))
@@ -79,7 +83,7 @@ def run(chosen: argparse.Namespace) -> int:
     if not diagnosis.ok:
         _tell_of_balls(console, chain)
     if not chosen.dry_run:
-        text = _text(there, closed, diagnosis)
+        text = _text(there, (*gears, *closures), closed.actuated, diagnosis)
         _tables.written(console, (write_file(file, text, overwrite=chosen.overwrite),))
     return 0 if diagnosis.ok else 1
 
@@ -139,7 +143,7 @@ def _tell_of_balls(console: Console, chain: ClosedChain) -> None:
         console.print(f"{text}; joint_name and joint_type in a sidecar make SPHERICAL ones of them", soft_wrap=True)
 
 
-def _text(there: Path | None, chain: ClosedChain, diagnosis: Diagnosis) -> str:
+def _text(there: Path | None, closures: Sequence[Closure], actuated: Sequence[str], diagnosis: Diagnosis) -> str:
     """Return the sidecar: closures, motors, a closed configuration, and what the one there says besides."""
     from fivebar_pin.io._sidecar import Sidecar, dump_sidecar, read_sidecar
 
@@ -147,5 +151,5 @@ def _text(there: Path | None, chain: ClosedChain, diagnosis: Diagnosis) -> str:
     configurations = dict(old.configurations)
     if diagnosis.gap < _CLOSED and not configurations:
         configurations["closed"] = [float(x) for x in np.array(diagnosis.q)]
-    new = replace(old, closures=chain.closures, actuated=chain.actuated, configurations=configurations)
+    new = replace(old, closures=tuple(closures), actuated=tuple(actuated), configurations=configurations)
     return dump_sidecar(new)

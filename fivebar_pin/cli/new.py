@@ -15,7 +15,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         description="Write a commented linkage file (YAML), which every command takes as a mechanism.",
     )
     parser.add_argument("kind", help="four-bar, five-bar, six-bar or slider-crank")
-    parser.add_argument("--out", default=".", metavar="FOLDER", help="where to write it (default: here)")
+    parser.add_argument("--out", default=".", metavar="PATH", help="folder, or file.yaml (default: here)")
     parser.add_argument("--overwrite", action="store_true", help="replace a file of that name")
     parser.set_defaults(run=run)
 
@@ -26,8 +26,10 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin.planar.starts import start_text
 
     text = start_text(chosen.kind)
-    name = f"{chosen.kind.replace('-', '_')}.yaml"
-    (path,) = write_set(as_path(chosen.out), {name: text}, overwrite=chosen.overwrite)
+    folder, name = as_path(chosen.out), f"{chosen.kind.replace('-', '_')}.yaml"
+    if folder.suffix.lower() in (".yaml", ".yml") and not folder.is_dir():
+        folder, name = folder.parent, folder.name
+    (path,) = write_set(folder, {name: text}, overwrite=chosen.overwrite)
     shown = shlex.quote(str(path))
     lines = [
         f"{path} written. Edit it, then:",

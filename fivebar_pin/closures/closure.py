@@ -6,6 +6,7 @@ reactions, diagnosis, files, drawing) asks the closure and knows no kinds.
 
 from __future__ import annotations
 
+import inspect
 from abc import ABCMeta
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -96,6 +97,14 @@ class _Family(ABCMeta):
 
     def __call__(cls, *args: Any, **named: Any) -> Any:
         return _shorthand(*args, **named) if cls is Closure else super().__call__(*args, **named)
+
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """What `help` shows: the arguments of the class instead of those of `__call__`."""
+        if cls is Closure:
+            return inspect.signature(_shorthand)
+        made = inspect.signature(cls.__init__)  # type: ignore[misc]
+        return made.replace(parameters=list(made.parameters.values())[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +240,7 @@ class Closure(Immutable, metaclass=_Family):
 
 
 def _shorthand(
-    frames: Iterable[str], kind: object = "3d", axis: npt.ArrayLike | None = None, name: str = "", **values: Any
+    frames: Iterable[str] = (), kind: object = "3d", axis: npt.ArrayLike | None = None, name: str = "", **values: Any
 ) -> Closure:
     """See `Closure`."""
     member = Closure.of_kind(kind)

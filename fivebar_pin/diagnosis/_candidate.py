@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure, ClosureKind
-from fivebar_pin.diagnosis._ends import COINCIDE, Evidence, Pair, Sight
+from fivebar_pin.diagnosis._ends import COINCIDE, End, Evidence, Pair, Sight, place_of
 from fivebar_pin.diagnosis._posed import is_planar
 
 __all__ = ["Candidate"]
@@ -21,8 +23,12 @@ _ALIGNED = 2e-3
 class Candidate:
     """A pair on its way to a proposal: the kinds it may have, the strongest first, and what became of it."""
 
-    def __init__(self, chain: ClosedChain, pair: Pair, starts: list[Array], kind: ClosureKind | None) -> None:
+    def __init__(
+        self, chain: ClosedChain, pair: Pair, starts: list[Array], kind: ClosureKind | None, others: Sequence[Pair] = ()
+    ) -> None:
         self.pair, self.chosen, self.reason = pair, False, ""
+        self.others = [end for other in others if other is not pair for end in other.ends]
+        self.is_planar = is_planar(chain, (pair.ends[0].joint, pair.ends[1].joint))
         M = Sight(chain, pair.ends, starts).M
         gaps = np.linalg.norm(M[0, :, :3, 3] - M[1, :, :3, 3], axis=-1)
         k = int(np.argmin(gaps))
@@ -38,9 +44,9 @@ class Candidate:
         said = _said(self.pair)
         if said is not None:
             return [said]
-        if any(end.is_leaf and end.hinge is not None for end in self.pair.ends):  # it has its hinge already
+        if any(self._ends_on_its_hinge(end) for end in self.pair.ends):  # it has its hinge already
             return [WELD, POINT]
-        if is_planar(chain, (self.pair.ends[0].joint, self.pair.ends[1].joint)):
+        if self.is_planar:
             return [POINT]
         halves = all(end.is_leaf and chain.model.inertias[end.joint].mass > 0.0 for end in self.pair.ends)
         turned = float(np.linalg.norm(pin.log3(self.Q)))
@@ -51,6 +57,11 @@ class Candidate:
         if not self.meets and halves and self.pair.evidence is Evidence.NAMED:
             return [WELD, POINT]
         return [POINT]
+
+    def _ends_on_its_hinge(self, end: End) -> bool:
+        """Whether a body ends at its own hinge: one that goes on to another loop is a third bar on that pin."""
+        goes_on = any(o.joint == end.joint and place_of(o) != place_of(end) for o in self.others)
+        return end.is_leaf and end.hinge is not None and not goes_on
 
     @property
     def places(self) -> set[tuple[float, ...]]:

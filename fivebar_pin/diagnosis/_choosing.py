@@ -75,7 +75,7 @@ def _one_by_one(chain: ClosedChain, candidates: list[Candidate], starts: list[Ar
     chosen: list[Candidate] = []
     for c in candidates:
         spent = {end for other in chosen for end in other.places} & c.places
-        if spent and c.pair.evidence not in _STATED:
+        if spent and not c.is_planar and c.pair.evidence not in _STATED:  # in a plane a pin may hold three bars
             c.reason = "one of its ends is joined already"
             continue
         for kind in c.kinds:

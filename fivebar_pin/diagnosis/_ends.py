@@ -24,6 +24,7 @@ __all__ = [
     "coinciding_pairs",
     "ends_of",
     "lone_pairs",
+    "place_of",
 ]
 
 
@@ -160,7 +161,7 @@ def coinciding_pairs(
             pair = _met(end, ends[i])
             if pair is None or _is_stack(chain.model, pair):
                 continue
-            key = (*sorted((end.joint, ends[i].joint)), *sorted((_place(end), _place(ends[i]))))
+            key = (*sorted((end.joint, ends[i].joint)), *sorted((place_of(end), place_of(ends[i]))))
             if key not in best or _rank(pair) < _rank(best[key]):
                 best[key] = pair
     return sorted(best.values(), key=_rank)
@@ -187,7 +188,8 @@ def _is_stack(model: pin.Model, pair: Pair) -> bool:
     return above == low.joint and not any(end.placement[:3, 3].any() for end in pair.ends)
 
 
-def _place(end: End) -> tuple[float, ...]:
+def place_of(end: End) -> tuple[float, ...]:
+    """Return where an end is on its body, to a micrometre (3,) [m]."""
     return tuple(float(x) for x in np.round(end.placement[:3, 3], 6))
 
 
@@ -206,7 +208,7 @@ def lone_pairs(ends: Iterable[End]) -> list[Pair]:
     tips: dict[tuple[int, tuple[float, ...]], End] = {}
     for end in ends:
         if end.is_marker and end.is_leaf and end.joint:
-            tips.setdefault((end.joint, _place(end)), end)
+            tips.setdefault((end.joint, place_of(end)), end)
     pairs = itertools.combinations(tips.values(), 2)
     found = [Pair(pair, Evidence.ENDS) for pair in pairs if pair[0].joint != pair[1].joint]
     return found if len(found) <= _MOST_ENDS else []

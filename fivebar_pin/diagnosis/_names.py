@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from fivebar_pin.diagnosis._ends import End, Evidence, Pair
 
@@ -15,6 +15,7 @@ _LETTER = re.compile(r"(?<![A-Za-z])([AaBb])(?![A-Za-z])")
 _DIGIT = re.compile(r"(?<!\d)([12])(?!\d)")
 _WORD = re.compile(r"(first|second|parent|child|start|end)(?![A-Za-z])", re.IGNORECASE)
 _POINT = re.compile(r"([A-KM-QS-Z]\d*|(?:pin|pivot|point|hinge)_?\d+)[_-].+")  # L and R are sides
+_SIDE = re.compile(r"left|right|(?<![A-Za-z])[fhr]?[lr](?![A-Za-z])", re.IGNORECASE)
 
 
 def named_pairs(ends: Iterable[End]) -> Iterator[Pair]:
@@ -47,13 +48,20 @@ def _side(word: str) -> int:
     return int(word in ("b", "2", "second", "child", "end"))
 
 
-def point_pairs(ends: Iterable[End]) -> Iterator[Pair]:
-    """Yield the markers that name one point of a drawing on two bodies, like B_coupler and B_rocker."""
+def point_pairs(ends: Iterable[End], meet: Callable[[End, End], bool]) -> Iterator[Pair]:
+    """Yield the markers that name one point of a drawing on two bodies, like B_coupler and B_rocker.
+
+    On more bodies the point may be a pin of several bars, or one point of several like legs; on a left and a right
+    body it may be one of either leg: where they meet decides.
+    """
     points: dict[str, list[End]] = {}
     for end in ends:
         said = _POINT.fullmatch(end.name)
         if end.is_marker and said:
             points.setdefault(said.group(1), []).append(end)
     for label, there in points.items():
-        if len(there) == 2 and there[0].joint != there[1].joint:
-            yield Pair((there[0], there[1]), Evidence.POINT, label)
+        first, *others = there
+        for k, other in enumerate(others):
+            clear = len(others) == 1 and _SIDE.sub("", first.name) != _SIDE.sub("", other.name)
+            if other.joint != first.joint and (clear or meet(first, other)):
+                yield Pair((first, other), Evidence.POINT, label if k == 0 else f"{label}_{k + 1}")

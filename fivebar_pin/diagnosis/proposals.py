@@ -21,10 +21,12 @@ from fivebar_pin.closures import Closure, ClosureKind
 from fivebar_pin.diagnosis._candidate import Candidate
 from fivebar_pin.diagnosis._choosing import choose
 from fivebar_pin.diagnosis._ends import (
+    COINCIDE,
     NEAR,
     End,
     Evidence,
     Pair,
+    Sight,
     coinciding_pairs,
     ends_of,
     lone_pairs,
@@ -98,7 +100,7 @@ def propose_closures(
     tried: list[Candidate] = []
     for found in [given] if given else _in_order(chain, ends, starts):
         held = {frozenset(c.joins) for c in (*chain.closures, *(one.closure for one in tried))}
-        fresh = [Candidate(chain, pair, starts, wanted) for pair in found if _names(pair) not in held]
+        fresh = [Candidate(chain, pair, starts, wanted, found) for pair in found if _names(pair) not in held]
         chosen = choose(chain, fresh, starts)
         tried += fresh
         if chosen:
@@ -128,7 +130,12 @@ def _given(ends: dict[str, End], pair: tuple[str, str]) -> Pair:
 
 def _in_order(chain: ClosedChain, ends: dict[str, End], starts: list[Array]) -> Iterable[list[Pair]]:
     """Yield the candidates by evidence; the next ones are asked for when none of these is chosen."""
-    yield [*named_pairs(ends.values()), *point_pairs(ends.values())]
+
+    def meet(one: End, other: End) -> bool:
+        sight = Sight(chain, (one, other), starts)
+        return bool(sight.gaps(0, np.array([1])).min() <= COINCIDE * chain.length)
+
+    yield [*named_pairs(ends.values()), *point_pairs(ends.values(), meet)]
     yield coinciding_pairs(chain, ends.values(), starts)[:_MOST_JUDGED]
     yield lone_pairs(ends.values())
     yield coinciding_pairs(chain, ends.values(), starts, within=NEAR)[:_MOST_JUDGED]

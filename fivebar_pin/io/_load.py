@@ -112,6 +112,11 @@ def mechanism_file(path: Path) -> Path:
     if not exists:
         raise FileFormatError(path, "there is no such file or folder")
     if not is_folder:
+        if is_linkage_file(path):
+            raise FileFormatError(path, "is a linkage file, not a tree: its points close its loops; `fb.load` reads it")
+        if path.suffix.lower() in (".yaml", ".yml"):
+            rule = "is no linkage file, which states linkage: NAME, and a sidecar is read with its tree: name the .urdf"
+            raise FileFormatError(path, rule)
         if path.suffix.lower() not in (".urdf", ".xml"):
             raise FileFormatError(path, "has an unknown ending; expected a .urdf or MJCF .xml file, or a folder")
         return path
@@ -202,6 +207,13 @@ def _mimics(tree: TreeEntry, sidecar: Sidecar) -> tuple[Closure, ...]:
     fixed = {name for name, word in sidecar.joint_types.items() if word == "FIXED"}
     moving = [j for j in tree.joints.values() if j.kind != "fixed" and j.name not in fixed]
     return tuple(j.mimic for j in moving if j.mimic is not None)
+
+
+def stated_couplings(urdf: Path, *, max_bytes: int = MAX_BYTES) -> tuple[tuple[Closure, ...], tuple[Closure, ...]]:
+    """Return the couplings of joints that a URDF states as <mimic>, and those of the sidecar beside it."""
+    beside = sidecar_file(urdf)
+    sidecar = Sidecar() if beside is None else read_sidecar(beside)
+    return _mimics(read_urdf(urdf, max_bytes=max_bytes), sidecar), tuple(c for c in sidecar.closures if c.counted)
 
 
 def _counting(tree: TreeEntry, closures: tuple[Closure, ...]) -> TreeEntry:

@@ -173,7 +173,9 @@ def plain_yaml(path: Path, max_bytes: int) -> object:
             keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
             doubled = {key for key in keys if keys.count(key) > 1} if len(keys) < 1000 else set()
             if doubled or len(keys) >= 1000:
-                raise FileFormatError(path, f"states {sorted(doubled)[:5] or 'too many keys'} more than once")
+                lines = [key.start_mark.line + 1 for key, _ in node.value if getattr(key, "value", None) in doubled]
+                where = f" (lines {', '.join(map(str, lines[:5]))})" if doubled else ""
+                raise FileFormatError(path, f"states {sorted(doubled)[:5] or 'too many keys'} more than once{where}")
             return super().construct_mapping(node, deep)
 
     text = read_bounded(path, max_bytes)

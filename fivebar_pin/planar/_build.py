@@ -236,11 +236,12 @@ class _Builder:
         for point, links in zip(spring.ends, (one, other), strict=True):
             if not links:
                 raise InvalidInputError(f"point {point} of a spring", spring.ends, "must belong to a bar or the ground")
-        pairs = [(a, b) for a in one for b in other if a != b]
-        if not pairs:
+        shared = next((link for link in one if link in other), None)
+        if shared is not None:
             raise InvalidInputError(
-                "spring between points", spring.ends, f"joins two points of one bar ({one[0]}): it does nothing"
+                "spring between points", spring.ends, f"joins two points of one bar ({shared}): it does nothing"
             )
+        pairs = [(a, b) for a in one for b in other]
         ends = [frame_of(link, point) for link, point in zip(pairs[0], spring.ends, strict=True)]
         return Spring(ends[0], ends[1], spring.stiffness, spring.length, spring.damping)
 

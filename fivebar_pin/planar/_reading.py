@@ -12,6 +12,7 @@ from typing import Any
 from fivebar_pin._files import as_path, read_bounded
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._sidecar import MAX_SIDECAR_BYTES, plain_yaml
+from fivebar_pin.planar._checks import Key, unknown_names
 from fivebar_pin.planar.linkage import Linkage
 
 __all__ = ["load"]
@@ -19,8 +20,6 @@ __all__ = ["load"]
 _KEYS = ("linkage", "gravity", "points", "ground", "bars", "plates", "slides", "masses", "springs", "gears", "motors")
 _MOTOR = re.compile(r"(?P<link>\S+)(\s+at\s+(?P<at>\S+))?(\s+on\s+(?P<on>\S+))?")
 _DEGREES = re.compile(r"(?P<number>[-+.\de]+)\s*deg")
-
-Key = str | int
 
 
 def load(path: object) -> Linkage:
@@ -67,8 +66,9 @@ class _Reader:
         for key in content:
             if key not in _KEYS:
                 raise self.fail((key,), str(UnknownNameError("key", key, _KEYS)))
-        gravity = {"gravity": content["gravity"]} if "gravity" in content else {}
-        made: Linkage = self.say(("linkage",), Linkage, content["linkage"], **gravity)
+        made: Linkage = self.say(("linkage",), Linkage, content["linkage"])
+        if "gravity" in content:
+            made = self.say(("gravity",), Linkage, made.name, gravity=content["gravity"])
         for point, place in self.mapping(("points",), content).items():
             self.say(("points", point), made.points, {point: self.numbers(("points", point), place)})
         self.say(("ground",), made.ground, *self.names(("ground",), content.get("ground", [])))
@@ -81,11 +81,11 @@ class _Reader:
             self.say(("masses", k), made.mass, entries.pop("bar"), **entries)
         for k, value in enumerate(self.sequence(("springs",), content)):
             entries = self.entries(("springs", k), value, ("between", "stiffness"), made.spring)
-            ends = self.names(("springs", k, "between"), entries.pop("between"))
+            ends = self.two(("springs", k, "between"), entries.pop("between"))
             self.say(("springs", k), made.spring, *ends, **entries)
         for k, value in enumerate(self.sequence(("gears",), content)):
             entries = self.entries(("gears", k), value, ("between", "ratio"), made.gear)
-            ends = self.names(("gears", k, "between"), entries.pop("between"))
+            ends = self.two(("gears", k, "between"), entries.pop("between"))
             self.say(("gears", k), made.gear, *ends, **entries)
         for k, value in enumerate(self.sequence(("motors",), content)):
             found = _MOTOR.fullmatch(value.strip()) if isinstance(value, str) else None
@@ -93,6 +93,8 @@ class _Reader:
                 raise self.fail(("motors", k), f"{value!r} must read like 'crank at A', or 'slider'")
             words = {word: name for word, name in found.groupdict().items() if name}
             self.say(("motors", k), made.motor, words.pop("link"), **words)
+        for where, error in unknown_names(made.sketch, made.links, made.gears, made.motors):
+            raise self.fail(where, str(error))
         return made
 
     def link(self, where: tuple[Key, ...], name: str, entries: dict[Any, Any], add: Callable[..., None]) -> None:
@@ -143,6 +145,12 @@ class _Reader:
         if not isinstance(value, list) or not all(isinstance(x, str) for x in value):
             raise self.fail(where, f"{str(value)[:40]!r} must be a list of names, such as [A, B]; quote numbers")
         return value
+
+    def two(self, where: tuple[Key, ...], value: object) -> list[str]:
+        names = self.names(where, value)
+        if len(names) != 2:
+            raise self.fail(where, f"{str(value)[:40]!r} must be two names")
+        return names
 
     def mapping(self, where: tuple[Key, ...], holder: dict[Any, Any]) -> dict[str, Any]:
         value = holder.get(where[-1]) or {}

@@ -14,6 +14,7 @@ from fivebar_pin._arrays import checked, number
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.planar._build import built
+from fivebar_pin.planar._checks import unknown_names
 from fivebar_pin.planar._closing import closed_at_home
 from fivebar_pin.planar._parts import (
     ALUMINIUM,
@@ -78,8 +79,16 @@ class Linkage:
         self.gears: list[Gear] = []
         self.motors: list[Motor] = []
 
+    def __repr__(self) -> str:
+        bars = ", ".join(f"{x.name} ({'-'.join(x.points)})" for x in self.links.values() if x.name != GROUND)
+        fixed = ", ".join(self.links[GROUND].points)
+        motors = ", ".join(f"{m.link} at {m.at}" if m.at else m.link for m in self.motors)
+        return f"Linkage({self.name!r}: ground {fixed or 'none'}; bars: {bars or 'none'}; motors: {motors or 'none'})"
+
     def points(self, places: Mapping[str, Sequence[float]] | None = None, /, **named: Sequence[float]) -> None:
         """Sketch points: P=(x, y) [m]; a mapping for names that are no words of Python."""
+        if not isinstance(places, Mapping | None):
+            raise InvalidInputError("points", places, "must map names to places, as A=(0, 0) or {'A': (0, 0)}")
         for name, place in {**(places or {}), **named}.items():
             _checked_name("point", name)
             if name in self.sketch:
@@ -178,8 +187,7 @@ class Linkage:
         """
         self._point_of(link, at)
         for what, value in (("mass", mass), ("inertia", inertia)):
-            if number(f"{what} on {link}", value) < 0.0:
-                raise InvalidInputError(f"{what} on {link}", value, "must not be negative")
+            _not_negative(f"{what} on {link}", value)
         x, y = checked(f"centre of the mass on {link}", centre, (2,))
         self.lumps.append(Lump(link, at, float(mass), complex(x, y), float(inertia)))
 
@@ -187,7 +195,7 @@ class Linkage:
         """Put a spring with a damper between two points: k [N/m], free length [m], c [N s/m]."""
         ends = self._known((first, second))
         values = [
-            number(f"{what} of spring {first}-{second}", value)
+            _not_negative(f"{what} of spring {first}-{second}", value)
             for what, value in (("stiffness", stiffness), ("length", length), ("damping", damping))
         ]
         self.springs.append(PointSpring((ends[0], ends[1]), *values))
@@ -254,6 +262,7 @@ class Linkage:
         _checked_name("bar", link.name)
         if link.name in self.links:
             raise InvalidInputError("names of bars", link.name, "is there already", "Choose another name.")
+        _check_words(f"points of {link.name}", link.points)
         if not link.points or len(set(link.points)) < len(link.points):
             raise InvalidInputError(f"points of {link.name}", link.points, "must be one or more different points")
         if link.length is not None:
@@ -269,11 +278,12 @@ class Linkage:
     def _checked_section(self, name: str, section: Section) -> Section:
         for what in ("density", "width", "thickness", "linear_density"):
             value = getattr(section, what)
-            if value is not None and number(f"{what} of {name}", value) < 0.0:
-                raise InvalidInputError(f"{what} of {name}", value, "must not be negative")
+            if value is not None:
+                _not_negative(f"{what} of {name}", value)
         return section
 
     def _known(self, points: Sequence[str]) -> tuple[str, ...]:
+        _check_words("points", points)
         for point in points:
             if point not in self.sketch:
                 raise UnknownNameError("point", point, self.sketch)
@@ -290,24 +300,26 @@ class Linkage:
             raise UnknownNameError(f"point of {link}", point, points)
 
     def _check_links(self) -> None:
-        for gear in self.gears:
-            for name in (gear.driver, gear.driven, gear.carrier):
-                self._link(name)
+        if not self.links[GROUND].points and not any(x.guide and x.guide.on == GROUND for x in self.links.values()):
+            problem = "must be one at least: a linkage stands on points that do not move"
+            raise InvalidInputError(f"points of the ground of {self.name}", (), problem, "Say ground(A=(0, 0)).")
+        if len(self.links) == 1:
+            raise InvalidInputError(f"bars of {self.name}", (), "must be one at least")
+        for _, error in unknown_names(self.sketch, self.links, self.gears, self.motors):
+            raise error
         for link in self.links.values():
-            self._known(link.points)
             if link.guide is not None:
-                carrier = self._link(link.guide.on)
+                carrier = self.links[link.guide.on]
                 if carrier is link or (carrier.guide is not None and carrier.guide.on == link.name):
                     raise InvalidInputError(f"slide {link.name}", link.guide.on, "slides on itself")
 
     def _completed(self, motor: Motor) -> Motor:
         """Return the motor with the link that it works against."""
-        link = self._link(motor.link)
+        link = self.links[motor.link]
         if not motor.at:
             if link.guide is None:
                 raise InvalidInputError(f"motor of {link.name}", "", "needs the point where it turns", "Say at=...")
             return replace(motor, on=link.guide.on)
-        self._point_of(link.name, motor.at)
         others = [x.name for x in self.links.values() if motor.at in x.points and x is not link]
         if motor.on:
             if motor.on not in others:
@@ -331,6 +343,18 @@ def _checked_name(kind: str, name: object) -> str:
     if not isinstance(name, str) or not _NAME.fullmatch(name) or (kind == "bar" and name == GROUND):
         raise InvalidInputError(f"name of a {kind}", name, "must be letters, digits, _, - or .")
     return name
+
+
+def _not_negative(name: str, value: object) -> float:
+    x = number(name, value)
+    if x < 0.0:
+        raise InvalidInputError(name, value, "must not be negative")
+    return x
+
+
+def _check_words(name: str, words: Sequence[str]) -> None:
+    if not all(isinstance(word, str) for word in words):
+        raise InvalidInputError(name, words, "must be names, one after the other and not in a list")
 
 
 def _places(name: str, places: Mapping[str, Sequence[float]] | None) -> dict[str, complex]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy.typing as npt
 
@@ -29,7 +30,8 @@ def load(
     """Load a closed chain: a linkage file (YAML with the key `linkage`), or what `fivebar_pin.io.load` reads.
 
     Args:
-        path: a linkage file (see `fivebar_pin.planar.load`); a folder with one URDF (and its sidecar) or one MJCF file;
+        path: a linkage file (see `fivebar_pin.planar.load`); a folder with one URDF (and its sidecar), one MJCF
+            file, or one linkage file and no other mechanism;
             a .urdf file whose sidecar lies beside it; an MJCF .xml file; or the name of a mechanism that ships
             (`fivebar_pin.io.shipped`), where no file or folder is called so.
         free_flyer: put the root of a URDF on a free-flying base.
@@ -46,7 +48,7 @@ def load(
         InvalidInputError, UnknownNameError: an argument of this call is wrong, or no file and no mechanism that ships
             has this name.
     """
-    file = as_path(path)
+    file = _linkage_of(as_path(path))
     if not is_linkage_file(file):
         return io.load(
             path, free_flyer=free_flyer, closures=closures, actuated=actuated, gravity=gravity, max_bytes=max_bytes
@@ -61,3 +63,14 @@ def load(
         raise FileFormatError(file, str(error)) from error
     chain = chain if actuated is None else chain.with_actuated(actuated)
     return chain if gravity is None else chain.with_gravity(gravity)
+
+
+def _linkage_of(path: Path) -> Path:
+    """Return the linkage file of a folder that holds one and no other mechanism; else the path."""
+    try:
+        files = sorted(path.iterdir()) if path.is_dir() else []
+    except OSError:
+        return path  # whoever reads it says why it cannot be read
+    linkages = [file for file in files if is_linkage_file(file)]
+    others = [file for file in files if file.suffix.lower() in (".urdf", ".xml")]
+    return linkages[0] if len(linkages) == 1 and not others else path

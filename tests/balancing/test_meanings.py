@@ -16,6 +16,7 @@ from fivebar_pin.balancing import Ball, Box, Design, balance, balance_problem, c
 from fivebar_pin.balancing.regressors.measures import MEASURES
 from fivebar_pin.cli._moving import standing, sway
 from fivebar_pin.dynamics import Loads, inverse_dynamics
+from fivebar_pin.errors import InvalidInputError
 
 ABOUT = (0.07, -0.11, 0.05)
 OBJECTIVES = ("inertia", *(f"{s}_{m}" for m in MEASURES for s in ("rms", "peak", "mean_square")))
@@ -213,3 +214,10 @@ def test_a_mean_square_is_round_off_when_its_root_is() -> None:
     for share, gone in ((1e-7, False), (1e-13, True)):
         assert (settled(share * root, root) == 0.0) == gone
         assert (settled((share * root) ** 2, design.scale("mean_square_shaking_force")) == 0.0) == gone
+
+
+def test_what_is_compared_has_names() -> None:
+    chain = fb.load("four_bar_crank_rocker")
+    for chains, message in (([chain], "must map names to mechanisms"), ({}, "must hold at least one mechanism")):
+        with pytest.raises(InvalidInputError, match=message):
+            compare(chains, ())

@@ -124,7 +124,9 @@ def test_a_counterweight_stays_where_it_is_on_a_link_that_changes() -> None:
 
 def test_a_link_cannot_be_cut_down_to_nothing() -> None:
     light = CHAIN.with_inertias({"strut": pin.Inertia(0.01, np.zeros(3), np.eye(3) * 1e-5)})
-    with pytest.raises(InvalidInputError, match="mass of the body of joint strut"):
+    with pytest.raises(
+        InvalidInputError, match=r"mass of the body of joint strut = .* weighs 0\.01 kg, what it is .* Cut off less"
+    ):
         light.with_parameters(strut=0.05)
 
 
@@ -162,6 +164,31 @@ def test_a_placement_from_a_base_comes_back_from_a_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         find(moved, "stop").placement.homogeneous, there.at({"l": 0.7}).homogeneous, rtol=0.0, atol=1e-15
     )
+
+
+def test_a_link_that_was_made_lighter_cannot_be_cut_down_to_moments_that_no_body_has() -> None:
+    """A point of the strut's mass has none of its moment of inertia: a shorter strut would have less than none."""
+    strut = CHAIN.model.inertias[CHAIN.model.getJointId("strut")]
+    point = CHAIN.with_inertias({"strut": pin.Inertia(strut.mass, strut.lever, np.eye(3) * 1e-9)})
+    with pytest.raises(InvalidInputError, match=r"moments of inertia of the body of joint strut = .* Cut off less"):
+        point.with_parameters(strut=0.8 * VALUES["strut"])
+    longer = point.with_parameters(strut=1.2 * VALUES["strut"])
+    assert np.linalg.eigvalsh(longer.model.inertias[CHAIN.model.getJointId("strut")].inertia).min() > 0.0
+
+
+def test_points_of_mass_may_move_onto_each_other() -> None:
+    """Their moment of inertia about the mass centre is round-off then, of either sign."""
+    made = fb.planar.Linkage("pendulum")
+    made.ground(A=(0, 0))
+    made.points(B=(0.3, 0.4))
+    made.bar("rod", "A", "B", density=0.0)
+    made.mass("rod", at="B", mass=0.3)
+    made.motor("rod", at="A")
+    pendulum = made.chain()
+    for length in np.linspace(0.1, 0.4, 31):
+        tip = pin.Inertia(0.1, np.array([length, 0.0, 0.0]), np.zeros((3, 3)))
+        heavy = pendulum.with_inertias({"rod": pendulum.model.inertias[1] + tip})
+        assert heavy.with_parameters(rod=length).mass == pytest.approx(0.4)
 
 
 def test_a_saved_chain_keeps_its_parameters_to_the_last_digit(tmp_path: Path) -> None:
@@ -229,6 +256,7 @@ def find(chain: fb.ClosedChain, frame: str) -> pin.Frame:
     ("make", "kind", "message"),
     [
         (lambda: arm().with_parameters(k=1.0), UnknownNameError, "parameter 'k'; known: l, alpha"),
+        (lambda: arm().with_parameters([("l", 1.0)]), InvalidInputError, "must map names to numbers"),
         (lambda: arm().with_parameters(l=np.inf), InvalidInputError, "parameter l = inf but must be finite"),
         (lambda: arm().with_parameters(l=0.0), InvalidInputError, "the bar would turn over"),
         (lambda: arm(at=0.31), InvalidInputError, "placement of two = .* lies that far from"),
@@ -240,6 +268,10 @@ def find(chain: fb.ClosedChain, frame: str) -> pin.Frame:
         (lambda: arm(bodies=(BarBody(("start", "stop"), 1.0),)), UnknownNameError, "frame of a body 'stop'"),
         (lambda: arm(bodies=(BarBody(("start", "two_link"), 1.0),)), InvalidInputError, "frames of one link"),
         (lambda: Placement("end", (("l", np.zeros(3)),)), InvalidInputError, "twist of l"),
+        (lambda: Placement("end", ("l", X)), InvalidInputError, "must be pairs of a parameter and its twist"),
+        (lambda: Placement("end", (), np.diag([2.0, 1, 1, 1])), InvalidInputError, "a rotation and a translation"),
+        (lambda: Placement("end", (), np.diag([-1.0, 1, 1, 1])), InvalidInputError, "a rotation and a translation"),
+        (lambda: Placement("end", (), np.diag([1.0, 1, 1, 0])), InvalidInputError, "a rotation and a translation"),
         (lambda: BarBody(("a", "b", "c"), 1.0), InvalidInputError, "must be 2 different names"),
         (lambda: BarBody(("a", "a"), 1.0), InvalidInputError, "different names"),
         (lambda: BarBody(("a", "b"), -1.0), InvalidInputError, "linear_density of the body a-b"),

@@ -58,6 +58,53 @@ def test_an_existing_sidecar_is_refused_before_and_kept_in_what_it_says_besides(
     np.testing.assert_array_equal(chain.model.gravity.linear, [0.0, -1.0, 0.0])
 
 
+MIMIC = '<mimic joint="{}" multiplier="-2" offset="0.3"/></joint>'
+WHEEL = '<link name="wheel"/><joint name="turn" type="revolute"><parent link="{}"/><child link="wheel"/>'
+LIMIT = '<axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="1" velocity="1"/>'
+
+
+def geared(folder: Path) -> Path:
+    """Return a five-bar without a sidecar whose first crank turns a wheel that mimics it."""
+    urdf = lone(folder)
+    ground = fb.load(fb.io.shipped_path(urdf.stem)).model.frames[1].name
+    more = WHEEL.format(ground) + LIMIT + MIMIC.format("psi")
+    urdf.write_text(urdf.read_text().replace("</robot>", more + "</robot>"))
+    return urdf
+
+
+def test_a_joint_that_mimics_another_gets_no_motor_of_its_own(tmp_path: Path, capsys) -> None:
+    urdf = geared(tmp_path)
+    assert main(["close", str(urdf)]) == 0
+    out = capsys.readouterr().out
+    assert "couplings that are stated already: turn mimic" in out and "mobility 2, exactly actuated" in out
+    chain = fb.load(urdf)
+    assert set(chain.actuated) == {"psi", "gamma"} and {c.kind.value for c in chain.closures} == {"3d", "coupling"}
+    assert np.abs(fb.closure_residual(chain, chain.references["closed"])).max() < 1e-12
+    assert main(["check", str(urdf)]) == 0
+
+
+def test_the_couplings_of_a_sidecar_are_kept(tmp_path: Path) -> None:
+    urdf = geared(tmp_path)
+    urdf.write_text(urdf.read_text().replace(MIMIC.format("psi"), "</joint>"))
+    old = "closed_loop: [[turn, psi]]\ntype: [coupling]\nratio: [[1, 2]]\noffset: [0.3]\nname_mot: []\n"
+    urdf.with_suffix(".yaml").write_text(old)
+    assert main(["close", str(urdf), "--overwrite"]) == 0
+    chain = fb.load(urdf)
+    assert set(chain.actuated) == {"psi", "gamma"} and {c.kind.value for c in chain.closures} == {"3d", "coupling"}
+
+
+def test_a_train_of_gears_without_a_loop_gets_its_motor(tmp_path: Path, capsys) -> None:
+    urdf = tmp_path / "train.urdf"
+    body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    drum = f'<link name="drum">{body}<joint name="axle" type="revolute"><parent link="base"/><child link="drum"/>'
+    wheel = WHEEL.format("base").replace('<link name="wheel"/>', f'<link name="wheel">{body}')
+    text = f"{drum}{LIMIT}</joint>{wheel}{LIMIT}{MIMIC.format('axle')}"
+    urdf.write_text(f'<robot name="train"><link name="base"/>{text}</robot>')
+    assert main(["close", str(urdf)]) == 0
+    assert "check: ok, mobility 1" in capsys.readouterr().out
+    assert fb.load(urdf).actuated == ("axle",)
+
+
 def test_the_only_sidecar_of_a_folder_is_the_one_that_is_replaced(tmp_path: Path) -> None:
     """It is the one that load reads, whatever it is called."""
     lone(tmp_path)
@@ -142,3 +189,6 @@ def test_only_a_urdf_can_be_closed(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "is no .urdf file; a sidecar closes the loops of a URDF only" in capsys.readouterr().err
     assert main(["close", str(tmp_path / "none.urdf")]) == 1
     assert "there is no such file or folder" in capsys.readouterr().err
+    assert main(["new", "four-bar", "--out", str(tmp_path / "mine.yaml")]) == 0
+    assert main(["close", str(tmp_path / "mine.yaml")]) == 1
+    assert "is a linkage file, not a tree: its points close its loops" in capsys.readouterr().err

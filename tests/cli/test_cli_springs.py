@@ -99,3 +99,26 @@ def test_balance_holds_the_springs_by_the_weight_of_the_file(
     assert np.abs(still.torque).max() < 1e-11
     assert main(["conditions", file, "--kind", "static", "--along", "0", "-1", "0"]) == 1
     assert "--along" in capsys.readouterr().err
+
+
+LAMP = """\
+linkage: lamp
+points: {A: [0, 0], B: [0, 0.2], C: [0.44, 0.24], D: [0.44, 0.44], T: [0.7, 0.3]}
+ground: [A, B]
+bars: {lower: {points: [A, C], density: 0}, upper: {points: [B, D], density: 0}, head: {points: [C, D, T], density: 0}}
+masses: [{bar: head, at: T, mass: 2}]
+springs: [{between: [C, B], stiffness: 98.1}]
+motors: [lower at A]
+"""
+
+
+def test_a_parallelogram_lamp_is_balanced_on_its_branch_and_said_not_to_be_when_crossed(tmp_path: Path, capsys) -> None:
+    """V = m g y_T + k |CB|^2 / 2 is constant for k = m g / |AB| while the bars are parallel."""
+    path = tmp_path / "lamp.yaml"
+    path.write_text(LAMP)
+    residuals = {}
+    for branch in ("all", "motion"):
+        text = said(capsys, "conditions", str(path), "--kind", "static", "--branch", branch)
+        residuals[branch] = float(text.split("as it is: ")[1].split()[0])
+        assert ("in all assembly modes" if branch == "all" else "on one branch") in text
+    assert residuals["all"] > 0.1 and residuals["motion"] < 1e-12

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import inspect
 import pickle
 import re
 from dataclasses import dataclass
@@ -227,11 +228,19 @@ def test_logarithm_holds_near_zero_and_near_half_a_turn():
         np.testing.assert_allclose(log3(pin.exp3(angle * axis)), angle * axis, rtol=0.0, atol=1e-9 * max(angle, 1e-3))
 
 
+@pytest.mark.parametrize("kind", [fb.Closure, *fb.Closure.family.values()], ids=lambda kind: kind.__name__)
+def test_help_shows_the_arguments_that_a_closure_takes(kind) -> None:
+    words = inspect.signature(kind).parameters
+    assert next(iter(words)) in ("frames", "ratios") and "self" not in words and "args" not in words
+
+
 def test_closures_reject_what_they_cannot_be():
     with pytest.raises(InvalidInputError, match="must be two frame names"):
         fb.Closure(("a",))  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="must be two frame names"):
         fb.Closure("ab")  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="must be two frame names"):
+        fb.Closure()
     with pytest.raises(
         UnknownNameError, match=r"Unknown closure kind '4d'; known: 3d, 6d, coupling, cylindrical, distance, revolute"
     ):

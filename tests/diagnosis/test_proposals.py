@@ -298,6 +298,53 @@ def test_no_end_is_joined_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(propose_closures(replace(tree, model=model))) == 2
 
 
+def three_bars_on_a_pin(*names: str, aside: float = 0.0) -> fb.ClosedChain:
+    """Return a bar and two telescopes on the ground whose tips meet in neutral; the third one's may lie aside."""
+    joints = [(0, Z(), at()), (0, Z(), at(x=1.0)), (2, SLIDE(), at()), (0, Z(), at(y=-1.0)), (4, SLIDE(), at())]
+    tips = [(1, at(x=0.4, y=0.3)), (3, at(x=-0.6, y=0.3)), (5, at(x=0.4, y=1.3 + aside))]
+    return branches(*joints, marks=dict(zip(names, tips, strict=True)))
+
+
+@pytest.mark.parametrize("names", [("P_bar", "P_rod", "P_strut"), ("one", "two", "three")])
+def test_a_pin_that_three_bars_share_in_a_plane_is_closed_twice(names: tuple[str, ...]) -> None:
+    tree = three_bars_on_a_pin(*names)
+    proposals = propose_closures(tree)
+    assert chosen(proposals) == {frozenset((names[0], other)): "3d" for other in names[1:]}
+    assert diagnose(closing(tree, proposals)).generic_mobility == 1
+
+
+def test_points_of_three_bodies_that_do_not_meet_are_not_one_pin() -> None:
+    """A_leg1, A_leg2, A_leg3 are a point of each leg; two of these happen to meet here."""
+    proposals = propose_closures(three_bars_on_a_pin("P_one", "P_two", "P_three", aside=0.5))
+    assert chosen(proposals) == {frozenset(("P_one", "P_two")): "3d"}
+
+
+def test_one_point_of_a_left_and_a_right_leg_is_no_loop_unless_they_meet() -> None:
+    """S_left and S_right are two soles; the loops are where frames coincide. P_left and P_right may be a five-bar's."""
+    bars = [(0, Z(), at()), (1, Z(), at(x=0.4)), (0, Z(), at(x=1.0)), (3, Z(), at(x=-0.4))]
+    for one, other in (("S_left", "S_right"), ("S_fl", "S_fr"), ("S1_leftfoot", "S1_rightfoot")):
+        marks = {one: (2, at(x=0.1)), other: (4, at(x=0.1)), "u": (2, at(0.2)), "v": (4, at())}
+        (proposal,) = [p for p in propose_closures(branches(*bars, marks=marks)) if p.chosen]
+        assert proposal.evidence is not Evidence.POINT and set(proposal.closure.frames) == {"u", "v"}
+    meeting = branches(*bars, marks={"P_left": (2, at(x=0.2, y=0.3)), "P_right": (4, at(x=0.0, y=0.3))})
+    assert chosen(propose_closures(meeting)) == {frozenset(("P_left", "P_right")): "3d"}
+
+
+def test_a_third_bar_on_a_pin_that_goes_on_to_another_loop_is_pinned_not_welded() -> None:
+    """Jansen's leg has such pins: the bar hangs on its hinge at the pin, and its other end belongs to a loop too."""
+    made = fb.planar.Linkage("leg")
+    made.ground(A=(0, 0), B=(0.4, 0), F=(0.9, 0.1))
+    made.points(C=(0.05, 0.09), D=(0.36, 0.3), E=(0.8, 0.35))
+    for name, points in (("crank", "AC"), ("coupler", "CD"), ("rocker", "BD"), ("link", "DE"), ("output", "FE")):
+        made.bar(name, *points)
+    made.motor("crank", at="A")
+    chain = made.chain()
+    tree = opened(chain)
+    proposals = propose_closures(tree, chain.references["home"])
+    assert sorted(chosen(proposals).values()) == ["3d", "3d"]
+    assert diagnose(closing(tree, proposals)).generic_mobility == 1
+
+
 def two_arms(turn: pin.SE3, *, joints: int = 4, marks: bool = True) -> fb.ClosedChain:
     """Two spatial arms whose hands meet in neutral, the second one's frame turned against the first one's."""
     rng = np.random.default_rng(3)

@@ -77,7 +77,7 @@ def test_a_linkage_file_loads_like_any_mechanism(tmp_path: Path) -> None:
 
 def test_other_yaml_is_not_taken_for_a_linkage(tmp_path: Path) -> None:
     fb.save(load_text(tmp_path, GOOD).chain(), tmp_path / "out", formats=("urdf",))
-    with pytest.raises(FileFormatError, match="unknown ending"):
+    with pytest.raises(FileFormatError, match=r"is no linkage file, .* name the .urdf"):
         fb.load(tmp_path / "out" / "four.yaml")
     with pytest.raises(FileFormatError, match="is no linkage file: it needs the key linkage"):
         load(tmp_path / "out" / "four.yaml")
@@ -113,7 +113,17 @@ def load_text(folder: Path, text: str) -> Linkage:
         ("C: [0.05, 9e-2]", "C: [0, 0, 0]", r"points, C \(line 2\): shape of point C"),
         ("motors", "masses: [{bar: crank, at: A, mass: -1}]\nmotors", r"masses\[0\] \(line 8\): mass on crank = -1"),
         ("motors", "masses: [crank]\nmotors", r"masses\[0\] \(line 8\): must map words to values, such as bar"),
-        ("motors", "springs: [{between: [A], stiffness: 1}]\nmotors", r"springs\[0\] \(line 8\): cannot be understood"),
+        ("motors", "springs: [{between: [A], stiffness: 1}]\nmotors", r"between \(line 8\): .* must be two names"),
+        ("motors", "gears: [{between: [crank], ratio: 2}]\nmotors", r"between \(line 8\): .* must be two names"),
+        ("motors", "springs: [{between: [A, D], stiffness: -1}]\nmotors", r"springs\[0\] \(line 8\): stiffness"),
+        ("rocker: [B, D]", "rocker: [B, Q]", r"bars, rocker \(line 7\): Unknown point of bar rocker 'Q'"),
+        ("motors: [crank at A]", "motors: [cronk at A]", r"motors\[0\] \(line 8\): Unknown bar 'cronk'"),
+        ("motors: [crank at A]", "motors: [crank at B]", r"motors\[0\] \(line 8\): Unknown point of crank 'B'"),
+        ("motors", "gears: [{between: [crank, q], ratio: 2}]\nmotors", r"gears\[0\] \(line 8\): Unknown bar 'q'"),
+        ("motors", "slides: {s: {points: [P], on: q}}\nmotors", r"slides, s \(line 8\): Unknown bar 'q'"),
+        ("motors", "plates: {p: [A, D, Q]}\nmotors", r"plates, p \(line 8\): Unknown point of bar p 'Q'"),
+        ("motors", "gravity: 9.81\nmotors", r"gravity \(line 8\): shape of gravity"),
+        ("motors", "ground: [A]\nmotors", r"states \['ground'\] more than once \(lines 3, 8\)"),
         ("motors", "gears: [{between: [crank, rocker]}]\nmotors", r"gears\[0\] \(line 8\): ratio is missing"),
         ("motors", "slides: {s: {points: [P], angle: 3 dog}}\nmotors", r"slides, s, angle \(line 8\): '3 dog'"),
         ("motors", "slides: {s: {points: []}}\nmotors", r"slides, s \(line 8\): points of s"),
@@ -152,6 +162,18 @@ def test_a_new_file_loads_checks_and_is_not_overwritten(tmp_path: Path, kind: st
     assert "exists already" in capsys.readouterr().err and path.read_text().endswith("# mine\n")
     assert cli.main(["new", kind, "--out", str(tmp_path), "--overwrite"]) == 0
     assert path.read_text() == start_text(kind)
+
+
+def test_a_new_file_may_be_named_and_its_folder_loads(tmp_path: Path, capsys) -> None:
+    assert cli.main(["new", "four-bar", "--out", str(tmp_path / "mine.yaml")]) == 0
+    assert (tmp_path / "mine.yaml").read_text() == start_text("four-bar")
+    assert fb.load(tmp_path).name == "my_four_bar"
+    (tmp_path / "other.yaml").write_text(GOOD)
+    with pytest.raises(FileFormatError, match=r"holds no .urdf"):
+        fb.load(tmp_path)
+    (tmp_path / "other.yaml").unlink()
+    fb.save(fb.load("four_bar_crank_rocker"), tmp_path / "tree.urdf")
+    assert fb.load(tmp_path).name == "four_bar_crank_rocker"
 
 
 def test_what_is_written_beside_a_new_file_leaves_it_alone(tmp_path: Path) -> None:

@@ -383,6 +383,11 @@ def test_lengths_that_do_not_close_name_the_point_and_the_gap() -> None:
         (lambda m: m.mass("crank", at="A", mass=-1.0), InvalidInputError, "must not be negative"),
         (lambda m: m.mass("cronk", at="A", mass=1.0), UnknownNameError, "Did you mean 'crank'"),
         (lambda m: m.spring("A", "Q", stiffness=1.0), UnknownNameError, "point 'Q'"),
+        (lambda m: m.spring("A", "D", stiffness=-1.0), InvalidInputError, "stiffness of spring A-D = -1.0"),
+        (lambda m: m.spring("A", "D", stiffness=1.0, damping=-1.0), InvalidInputError, "damping of spring A-D = -1.0"),
+        (lambda m: m.bar("x", ["A", "D"]), InvalidInputError, "names, one after the other and not in a list"),
+        (lambda m: m.ground(["A"]), InvalidInputError, "names, one after the other and not in a list"),
+        (lambda m: m.points((0, 0)), InvalidInputError, "must map names to places"),
     ],
 )
 def test_what_is_wrong_is_said_at_once(say, kind, message) -> None:
@@ -393,7 +398,11 @@ def test_what_is_wrong_is_said_at_once(say, kind, message) -> None:
 @pytest.mark.parametrize(
     ("say", "kind", "message"),
     [
-        (lambda m: m.bar("x", "A", "Q"), UnknownNameError, "point 'Q'"),
+        (lambda m: m.bar("x", "A", "Q"), UnknownNameError, "point of bar x 'Q'"),
+        (lambda m: m.gear("crank", "whel", ratio=2.0), UnknownNameError, "bar 'whel'"),
+        (lambda m: m.spring("A", "A", stiffness=1.0), InvalidInputError, r"of one bar \(ground\): it does nothing"),
+        (lambda m: m.spring("A", "B", stiffness=1.0), InvalidInputError, r"of one bar \(ground\): it does nothing"),
+        (lambda m: m.spring("C", "D", stiffness=1.0), InvalidInputError, r"of one bar \(coupler\): it does nothing"),
         (lambda m: m.motor("cronk", at="A"), UnknownNameError, "Did you mean 'crank'"),
         (lambda m: m.motor("crank", at="B"), UnknownNameError, "point of crank"),
         (lambda m: m.motor("crank"), InvalidInputError, "needs the point where it turns"),
@@ -414,6 +423,41 @@ def test_what_is_wrong_with_the_whole_is_said_by_chain(say, kind, message) -> No
     say(made)
     with pytest.raises(kind, match=message):
         made.chain()
+
+
+def test_a_linkage_that_stands_on_nothing_or_has_no_bars_is_told_so() -> None:
+    made = Linkage("loose")
+    with pytest.raises(InvalidInputError, match=r"points of the ground of loose = .* must be one at least"):
+        made.chain()
+    made.points(A=(0, 0), C=(1, 0))
+    made.bar("crank", "A", "C")
+    made.motor("crank", at="A")
+    with pytest.raises(InvalidInputError, match=r"points of the ground of loose = .* must be one at least"):
+        made.chain()
+    made = Linkage("bare")
+    made.ground(A=(0, 0))
+    with pytest.raises(InvalidInputError, match=r"bars of bare = .* must be one at least"):
+        made.chain()
+
+
+def test_slides_on_the_ground_are_ground_enough() -> None:
+    """An elliptic trammel has no pivot on the ground."""
+    made = Linkage("trammel")
+    made.points(X=(0.3, 0), Y=(0, 0.4))
+    made.slide("along", "X", mass=0.1)
+    made.slide("up", "Y", angle=0.5 * np.pi, mass=0.1)
+    made.bar("rod", "X", "Y")
+    made.motor("along")
+    assert fb.diagnose(made.chain()).mobility == 1
+
+
+def test_a_linkage_and_its_chain_show_what_they_are_made_of() -> None:
+    made = plain()
+    made.motor("crank", at="A")
+    assert repr(made) == (
+        "Linkage('four': ground A, B; bars: crank (A-C), coupler (C-D), rocker (B-D); motors: crank at A)"
+    )
+    assert "; parameters: A_x, A_y, B_x, B_y, crank, coupler, rocker)" in repr(made.chain())
 
 
 def test_every_refusal_is_of_the_family() -> None:
