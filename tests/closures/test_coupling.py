@@ -382,6 +382,52 @@ def test_joints_of_a_coupling_count_their_turns(joint):
     assert limits[0] < -1e300 and limits[1] > 1e300
 
 
+TURNS = {
+    "a pair": ({"a": 3.0, "b": 1.0}, 0.0, {"a": 2.0, "b": -6.0}),
+    "the slow wheel leads": ({"a": 1.0, "b": -0.5}, 0.2, {"a": 3.2, "b": 6.0}),
+    "both have turned": ({"a": 2.5, "b": 1.0}, 0.0, {"a": 4.0, "b": -10.0}),
+    "a rack tells the turns": ({"rack": 1.0, "a": -0.05}, 0.0, {"rack": 1.0, "a": 20.0}),
+}
+
+
+def _coupled_home(ratios: dict[str, float], offset: float, angles: dict[str, float], off: float) -> fb.ClosedChain:
+    """Return joints that turn, of cosine and sine, and a rack, with a reference whose angles are off [rad]."""
+    model, q = pin.Model(), []
+    for k, (name, x) in enumerate(angles.items()):
+        add(model, 0, pin.JointModelPX() if name == "rack" else pin.JointModelRUBZ(), at(float(k)), name, body(k))
+        q += [x] if name == "rack" else [np.cos(x + off), np.sin(x + off)]
+    model.referenceConfigurations["home"] = np.array(q)
+    return fb.ClosedChain(model, (Coupling(ratios, offset),), ())
+
+
+@pytest.mark.parametrize(("ratios", "offset", "angles"), TURNS.values(), ids=TURNS)
+@pytest.mark.parametrize("off", [0.0, 1e-7])
+def test_a_configuration_of_cosines_and_sines_gets_the_turns_that_close_it(ratios, offset, angles, off):
+    """Written with seven digits it closes as well as these say."""
+    chain = _coupled_home(ratios, offset, angles, off)
+    home = dict(zip(chain.joints, chain.references["home"], strict=True))
+    assert abs(fb.closure_residual(chain, chain.references["home"])[0]) < 4.0 * off + 1e-12
+    for name, x in angles.items():
+        assert abs(np.exp(1j * home[name]) - np.exp(1j * (x + off * (name != "rack")))) < 1e-12
+
+
+@pytest.mark.parametrize(("ratios", "offset", "angles"), TURNS.values(), ids=TURNS)
+def test_no_turns_are_invented_for_a_configuration_that_is_open(ratios, offset, angles):
+    home = _coupled_home(ratios, offset, angles, 1e-3).references["home"]
+    assert np.abs(home).max() <= np.pi
+
+
+def test_a_belt_over_five_wheels_knows_all_their_turns():
+    model, radii = pin.Model(), np.array([0.1, 0.05, 0.2, 0.15, 0.03])
+    for k in range(5):
+        add(model, 0, pin.JointModelRUBZ(), at(float(k)), f"p{k}", body(k))
+    angles = 1.0 / radii
+    model.referenceConfigurations["home"] = np.stack([np.cos(angles), np.sin(angles)], axis=1).ravel()
+    belt = [Coupling({f"p{k}": radii[k], f"p{k + 1}": -radii[k + 1]}) for k in range(4)]
+    chain = fb.ClosedChain(model, belt, ("p0",))
+    np.testing.assert_allclose(chain.references["home"], angles, rtol=0.0, atol=1e-12)
+
+
 OF_VELOCITY = (
     "armature", "damping", "rotorGearRatio", "rotorInertia", "lowerDryFrictionLimit", "upperDryFrictionLimit",
     "lowerEffortLimit", "upperEffortLimit", "lowerVelocityLimit", "upperVelocityLimit",
