@@ -19,6 +19,7 @@ Tie = tuple[Array, float]
 """Coefficients of a coupling in the coordinates q (nq,), and what their sum with q is."""
 
 _MOST = 1000  # turns that a joint is thought to have made
+_NODES = 100  # nodes of the search after which no turns are said to be found
 _HELD = 1e-6  # gap of a coupling that is that of numbers with six digits: share of its largest term over a turn [-]
 
 
@@ -52,7 +53,8 @@ def _fewest(A: Array, b: Array) -> Array | None:
 
     k = A.shape[1]
     rows = LinearConstraint(np.hstack([A, -A]), b - _HELD, b + _HELD)
-    found = milp(np.ones(2 * k), integrality=np.ones(2 * k), bounds=Bounds(0.0, _MOST), constraints=rows)
+    bounds, cost = Bounds(0.0, _MOST), np.ones(2 * k)
+    found = milp(cost, integrality=cost, bounds=bounds, constraints=rows, options={"node_limit": _NODES})
     if found.x is None:
         return None
     n = np.round(found.x)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 
 import mujoco
@@ -426,6 +427,19 @@ def test_a_belt_over_five_wheels_knows_all_their_turns():
     belt = [Coupling({f"p{k}": radii[k], f"p{k + 1}": -radii[k + 1]}) for k in range(4)]
     chain = fb.ClosedChain(model, belt, ("p0",))
     np.testing.assert_allclose(chain.references["home"], angles, rtol=0.0, atol=1e-12)
+
+
+def test_forty_wheels_that_do_not_mesh_are_given_up_soon():
+    """The search for their turns would go on for a minute if nothing ended it."""
+    radii, model = np.random.default_rng(0).uniform(0.5, 2.0, 41), pin.Model()
+    for k in range(41):
+        add(model, 0, pin.JointModelRUBZ(), at(float(k)), f"w{k}", body(k))
+    angles = 10.0 / radii + 1e-3 * np.arange(41) ** 2
+    model.referenceConfigurations["home"] = np.stack([np.cos(angles), np.sin(angles)], axis=1).ravel()
+    start = time.perf_counter()
+    chain = fb.ClosedChain(model, [Coupling({f"w{k}": radii[k], f"w{k + 1}": -radii[k + 1]}) for k in range(40)], ())
+    assert time.perf_counter() - start < 15.0
+    assert np.abs(chain.references["home"]).max() <= np.pi
 
 
 OF_VELOCITY = (
