@@ -137,7 +137,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
             Finding(
                 "error",
                 f"no configuration that closes the loops was found: closure {name} stays open by {size:.3g} m or rad. "
-                "Check the lengths and the frames of the closures.",
+                f"Check {loops.what_to_check}.",
             )
         )
     elif loops.m and loops.opposed(loops.pairs(poses))[0]:

@@ -17,7 +17,7 @@ from tied_chains import PLANET, RING, SUN, geared_five_bar, planetary_train, rac
 
 import fivebar_pin as fb
 from fivebar_pin.closures import Coupling
-from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
+from fivebar_pin.errors import AssemblyError, FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
 
 HINGES = pytest.mark.parametrize("joint", [pin.JointModelRZ, pin.JointModelRUBZ], ids=["angle", "cosine and sine"])
@@ -427,6 +427,20 @@ def test_a_belt_over_five_wheels_knows_all_their_turns():
     belt = [Coupling({f"p{k}": radii[k], f"p{k + 1}": -radii[k + 1]}) for k in range(4)]
     chain = fb.ClosedChain(model, belt, ("p0",))
     np.testing.assert_allclose(chain.references["home"], angles, rtol=0.0, atol=1e-12)
+
+
+def test_couplings_that_contradict_each_other_are_told_to_be_looked_at():
+    """Two gears of one pair with other offsets: lengths are named only where there are some."""
+    one = pair(2.5)
+    two = fb.ClosedChain(one.model, (*one.closures, Coupling({"a": 5.0, "b": 2.0}, 0.6, name="other")), ("a",))
+    (error,) = [str(p) for p in fb.diagnose(two).problems if p.severity == "error"]
+    assert error.endswith("m or rad. Check the ratios and offsets of the couplings.")
+    with pytest.raises(AssemblyError, match=r"or check the ratios and offsets of the couplings\."):
+        fb.assemble(two, [0.3])
+    free = five_bar((0.3, 0.2, 0.2, 0.25, 2.0))
+    far = fb.ClosedChain(free.model, (*free.closures, Coupling({"left": 1.0, "right": 1.0})), ("left",))
+    with pytest.raises(AssemblyError, match=r"link lengths and the frames of the closures, and the ratios and offsets"):
+        fb.assemble(far, [0.3])
 
 
 def test_forty_wheels_that_do_not_mesh_are_given_up_soon():
