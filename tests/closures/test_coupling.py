@@ -443,6 +443,20 @@ def test_couplings_that_contradict_each_other_are_told_to_be_looked_at():
         fb.assemble(far, [0.3])
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("ratio", "elbow"), [(2.5, 0.1), (2.0, 0.1), (-1.5, 0.2)])
+def test_the_modes_of_a_geared_five_bar_are_the_roots_over_all_turns_of_its_gear(ratio, elbow, seed):
+    """Driven at an elbow it closes where the right crank, which follows the left one, is a3 away from the left arm."""
+    a1, a2, a3, a4, a5 = 0.3, 1.2, 1.0, 0.25, 0.9
+    chain = geared_five_bar(ratio, offset=0.4)[0].with_actuated(("left_elbow",))
+    left = np.linspace(0.0, 4.0 * np.pi, 20_001)
+    tip = a1 * np.exp(1j * left) + a2 * np.exp(1j * (left + elbow))
+    gap = np.abs(tip - a5 - a4 * np.exp(1j * (0.4 - ratio * left))) - a3
+    roots = np.count_nonzero(np.diff(np.sign(gap)))
+    roots = roots if ratio % 1.0 else roots // 2
+    assert len(fb.assembly_modes(chain, [elbow], seed=seed)) == roots > 0
+
+
 def test_forty_wheels_that_do_not_mesh_are_given_up_soon():
     """The search for their turns would go on for a minute if nothing ended it."""
     radii, model = np.random.default_rng(0).uniform(0.5, 2.0, 41), pin.Model()
