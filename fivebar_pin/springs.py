@@ -45,7 +45,8 @@ class JointSpring(Immutable):
     """A spring with a damper beside it, on a joint of one degree of freedom.
 
     Attributes:
-        joint: name of the joint. On a continuous joint the deflection is taken within half a turn.
+        joint: name of the joint. On a continuous joint the deflection is taken within half a turn; one that
+            a coupling ties counts its turns, and so does its spring.
         stiffness: k [N m/rad or N/m].
         rest: coordinate at which it is relaxed [rad or m].
         damping: b [N m s/rad or N s/m].

@@ -13,10 +13,6 @@ ROUND_OFF = 2.0**-40
 to some hundred of them and a chain of solved equations adds to that [-]."""
 
 TINY = 1e-300
-"""Least divisor: smaller than any size met, so that a quotient of nothing by nothing is nothing [any unit]."""
-
-
-TINY = 1e-300
 """Least divisor: x / max(y, TINY) is huge where y is zero, and no number is none [any unit]."""
 
 

@@ -33,6 +33,7 @@ class ClosedChain(Immutable):
         model: the open tree; copied, the caller's stays untouched. A joint that a coupling ties counts its turns: one
             whose coordinates are a cosine and a sine is stored as an ordinary revolute joint about the same axis,
             without limits, so that q has one coordinate for it instead of two (`chain.nq`, not `model.nq`, counts).
+            Its reference configurations get the fewest whole turns that make the couplings hold.
         closures: loop closures between frames of the tree.
         actuated: names of the driven joints, in the order of all actuated columns; one degree of freedom each.
         name: what reports call the mechanism; the model's name unless given.
@@ -66,8 +67,7 @@ class ClosedChain(Immutable):
         put_in_place(self.model, self.geometry)
         check_tree(self.model)
         check_closures(self.model, self.closures)
-        counted = {name for closure in self.closures for name in closure.counted}
-        object.__setattr__(self, "model", counting_turns(self.model, counted))
+        object.__setattr__(self, "model", counting_turns(self.model, self.closures))
         check_actuated(self.model, self.actuated)
         object.__setattr__(self, "springs", checked_springs(self.model, self.springs))
         frames = {f.name for f in self.model.frames} if self.visuals else set()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain.turns import Tie, with_turns
+from fivebar_pin.closures import Closure
 
 __all__ = ["counting_turns"]
 
@@ -19,12 +21,15 @@ _OF_CONFIGURATION = ("lowerPositionLimit", "upperPositionLimit", "positionLimitM
 _ALIGNED = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
 
 
-def counting_turns(model: pin.Model, joints: Collection[str]) -> pin.Model:
-    """Return the model with the named joints of two coordinates (cosine, sine) as ordinary revolute ones.
+def counting_turns(model: pin.Model, closures: Iterable[Closure]) -> pin.Model:
+    """Return the model with joints of two coordinates (cosine, sine) that closures count the turns of as revolute ones.
 
-    They turn about the same axes, without limits. Reference configurations are converted, angles between -pi and pi:
-    the cosine and sine of a file do not tell more. The model itself is returned where there is nothing to do.
+    They turn about the same axes, without limits. Reference configurations are converted; of the turns, which cosine
+    and sine do not tell, the fewest are taken that make the closures hold. Where none do, angles are between -pi and
+    pi. The model itself is returned where there is nothing to do.
     """
+    closures = tuple(closures)
+    joints = {name for closure in closures for name in closure.counted}
     turned = {
         j for j in range(1, model.njoints) if model.names[j] in joints and model.nqs[j] == 2 and model.nvs[j] == 1
     }
@@ -46,8 +51,11 @@ def counting_turns(model: pin.Model, joints: Collection[str]) -> pin.Model:
         for j in set(range(1, model.njoints)) - turned:
             values[_part(out, j)] = np.array(getattr(model, word))[_part(model, j)]
         setattr(out, word, values)
+    ties = [_tie(out, closure.counted, *closure.tie) for closure in closures if closure.tie]
+    places = [int(out.idx_qs[j]) for j in sorted(turned)]
     for entry in model.referenceConfigurations:
-        out.referenceConfigurations[entry.key()] = _counted(model, out, turned, np.array(entry.data()))
+        q = _counted(model, out, turned, np.array(entry.data()))
+        out.referenceConfigurations[entry.key()] = with_turns(q, ties, places)
     return out
 
 
@@ -69,6 +77,14 @@ def _counted(model: pin.Model, out: pin.Model, turned: set[int], q: Array) -> Ar
         mine = q[_part(model, j)]
         counted[_part(out, j)] = np.arctan2(mine[1], mine[0]) if j in turned else mine
     return counted
+
+
+def _tie(model: pin.Model, joints: Iterable[str], ratios: Iterable[float], offset: float) -> Tie:
+    """Return a coupling in terms of a configuration (nq,)."""
+    c = np.zeros(model.nq)
+    for joint, ratio in zip(joints, ratios, strict=True):
+        c[model.idx_qs[model.getJointId(joint)]] = ratio
+    return c, offset
 
 
 def _part(model: pin.Model, j: int) -> slice:

@@ -196,6 +196,11 @@ class Closure(Immutable, metaclass=_Family):
         return ()
 
     @property
+    def tie(self) -> tuple[tuple[float, ...], float] | None:
+        """Coefficients of the joints in `counted` and what their sum is, where it is one of coordinates alone."""
+        return None
+
+    @property
     def mark(self) -> Mark:
         """How its frames are drawn."""
         return Mark("ball")

@@ -77,6 +77,11 @@ class Coupling(Closure, word="coupling"):
         """Names of the joints, which must count their turns."""
         return self.joins
 
+    @property
+    def tie(self) -> tuple[tuple[float, ...], float]:
+        """Ratios of the joints and the offset."""
+        return tuple(self.ratios.values()), self.offset
+
     def check(self, model: pin.Model, frames: Mapping[str, pin.Frame]) -> None:
         """Raise where a joint does not exist or has several degrees of freedom."""
         places = {name: j for j, name in enumerate(model.names) if j}

@@ -30,6 +30,8 @@ from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "diagnose"]
 
+Mask = npt.NDArray[np.bool_]
+
 _SETS = 12  # actuated sets listed
 _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 
@@ -58,11 +60,16 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     if q is None and here.rank < generic.rank:
         findings.append(Finding("warning", jump(chain, here, generic, "the configuration nearest to the neutral one")))
         here, gap = generic, float(generic.gap[0])
+    determinate = _determinate(chain, here.q[0])
+    if q is None and here is not generic:
+        usual = _determinate(chain, generic.q[0])
+        if any(np.any(there & ~then) for there, then in zip(determinate, usual, strict=True)):
+            # The neutral configuration lies flat: rows that share a load elsewhere have none to share there.
+            here, gap, determinate = generic, float(generic.gap[0]), usual
     actuation, undetermined, excess = _actuation(chain, generic)
     sets = mobility.determining_sets(chain, generic if here.rank < generic.rank else here, _SETS)
     redundant = _redundant_rows(loops, here, generic)
     sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
-    joints, closures, multipliers = _determinate(chain, here.q[0])
     findings += about_mobility(chain, here, generic, redundant)
     findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
     findings += about_singularity(chain, here, generic, actuation, sigma)
@@ -86,9 +93,12 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         actuated_sets=tuple(ActuatedSet(names, value) for names, value in sets),
         sigma=sigma,
         amplification=_amplification(loops, here.J[0], sigma),
-        determinate_joints=joints,
-        determinate_closures=closures,
-        determinate_rows=multipliers,
+        determinate_joints=determinate[0],
+        determinate_closures=determinate[1],
+        determinate_rows=tuple(
+            tuple(name for name, yes in zip(c.closure.row_names, determinate[2][c.rows], strict=True) if yes)
+            for c in loops.anchored
+        ),
         joints=chain.joints,
         closures=tuple(c.name for c in chain.closures),
         springs=tuple(s.name for s in chain.springs),
@@ -127,7 +137,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
             Finding(
                 "error",
                 f"no configuration that closes the loops was found: closure {name} stays open by {size:.3g} m or rad. "
-                "Check the lengths and the frames of the closures.",
+                f"Check {loops.what_to_check}.",
             )
         )
     elif loops.m and loops.opposed(loops.pairs(poses))[0]:
@@ -180,9 +190,7 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
     return float(np.abs(passive.solve(scaled[:, loops.actuated].T, loops.passive.size)).max())
 
 
-def _determinate(
-    chain: ClosedChain, q: Array
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], tuple[tuple[str, ...], ...]]:
+def _determinate(chain: ClosedChain, q: Array) -> tuple[Mask, Mask, Mask]:
     """Return which reaction components of joints and closures, and which rows of these, are not marked as open."""
     rest = np.zeros((1, chain.nv))
     still = Trajectory(np.zeros(1), q[None], rest, rest, np.zeros((1, chain.nv, chain.na)), np.zeros(1))
@@ -192,8 +200,4 @@ def _determinate(
     closures[[not c.ends for c in chain.closures]] = False  # a coupling of joints has no wrench
     for mask in (joints, closures):
         mask.setflags(write=False)
-    rows = [
-        tuple(name for name, yes in zip(c.closure.row_names, found.determinate_rows[0, c.rows], strict=True) if yes)
-        for c in loops_of(chain).anchored
-    ]
-    return joints, closures, tuple(rows)
+    return joints, closures, found.determinate_rows[0]

@@ -21,6 +21,7 @@ __all__ = [
     "body_rates",
     "centres",
     "gravity_wrenches",
+    "inner",
     "rotor_energy",
     "sizes",
     "speeds",
@@ -131,6 +132,16 @@ def sizes(moving: BodyRates, about: Array) -> tuple[Array, Array, Array]:
     force, centre = moving.rate[..., :3], moving.centre
     moment = moving.rate[..., 3:] - cross(centre, force)
     return tuple(np.linalg.norm(x, axis=2) for x in (force, moment, centre - about))
+
+
+def inner(bodies: Bodies, moving: BodyRates, moment: Array) -> Array:
+    """Return what the points of a body pull on each other, m k w^2 + |M| / k with its radius of gyration k (n, nb) [N].
+
+    It adds up to nothing, but the round-off of it is left where the mass centre lies on an axis at rest.
+    """
+    mk = np.sqrt(0.5 * np.trace(bodies.inertia, axis1=1, axis2=2) * bodies.mass)
+    spin = np.sum(moving.twist[..., 3:] ** 2, axis=2)
+    return np.asarray(mk * spin + np.divide(bodies.mass * moment, mk, out=np.zeros_like(moment), where=mk > 0.0))
 
 
 def speeds(tree: Tree, q: Array, centre: Array, N: Array) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fivebar_pin._arrays import TINY, Array, Immutable, cross, figures, finite, frozen, settled
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, rotor_energy, sizes, speeds, total_centre
+from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, inner, rotor_energy, sizes, speeds, total_centre
 from fivebar_pin.dynamics.elastic import SpringForces, spring_forces
 from fivebar_pin.dynamics.losses import friction_torque
 from fivebar_pin.dynamics.reactions import Reactions, determinate, reactions
@@ -199,7 +199,8 @@ class Loads(Immutable):
     def _sizes(self) -> dict[str, Array]:
         """Sums of the sizes of what adds up to each quantity (n,)."""
         chain, path, moving = self.chain, self.trajectory, self._bodies
-        mass = Bodies.of(chain).mass
+        bodies = Bodies.of(chain)
+        mass = bodies.mass
         force, moment, arm = sizes(moving, self.about)
         weight = mass * float(np.linalg.norm(chain.model.gravity.linear))
         tree = loops_of(chain).tree
@@ -210,7 +211,8 @@ class Loads(Immutable):
         work = np.sum((force + weight)[..., None] * linear + moment[..., None] * angular, axis=1)
         other = np.abs(np.array(chain.model.armature) * path.a) + np.abs(friction_torque(chain, path.v))
         other = other + self._sprung.size + np.abs(acting.torques(tree, poses)).sum(axis=0)
-        shaking, about = force.sum(axis=1), np.sum(moment + arm * force, axis=1)
+        whole = force + inner(bodies, moving, moment)
+        shaking, about = whole.sum(axis=1), np.sum(moment + arm * whole, axis=1)
         return {
             "torque": (work + np.einsum("nvk,nv->nk", np.abs(path.N), other)).max(axis=1, initial=0.0),
             "shaking_force": shaking,

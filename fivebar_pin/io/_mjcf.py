@@ -22,14 +22,16 @@ from fivebar_pin.io._sidecar import Sidecar
 from fivebar_pin.io._xml import parse_xml
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["ORDER", "UNBOUNDED", "read_mjcf"]
+__all__ = ["GRAIN", "MASSLESS", "ORDER", "UNBOUNDED", "read_mjcf"]
 
-UNBOUNDED, ORDER = "unbounded ", "joint order"
+UNBOUNDED, ORDER, MASSLESS = "unbounded ", "joint order", "massless "
 """Names of <custom><numeric> entries that our writer makes.
 
 A hinge whose coordinates are cosine and sine; for each joint its place in the file's order, when the chain has them in
-another.
+another; a body whose mass of one `GRAIN` stands for none.
 """
+GRAIN = 1e-14
+"""Mass and moments of inertia that a moving body without any is written with: ten times MuJoCo's least [kg, kg m2]."""
 
 _SECTIONS = (
     "actuator", "asset", "compiler", "contact", "custom", "default", "equality", "keyframe", "option", "sensor", "size",
@@ -71,6 +73,7 @@ def read_mjcf(
     if not bodies.order:
         raise FileFormatError(path, "has no joint in its <worldbody>")
     _unbounded(reader, root, bodies)
+    _massless(reader, root, bodies)
     found = Equality(reader, root, bodies).closures() if closures is None else closures
     driven = _actuated(reader, root, bodies) if actuated is None else actuated
     tree = bodies.tree(root.get("model") or path.stem)
@@ -147,6 +150,22 @@ def _unbounded(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) 
                 raise reader.fail(f"joint {joint.name!r}", "stiffness of a hinge that does not count its turns")
             data = {word: joint.data[word] for word in ("effort", "velocity")}
             bodies.joints[joint.name] = replace(joint, kind="continuous", data=data)
+
+
+def _massless(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> None:
+    """Take the grains of mass away that were given to bodies without; a mass stated since then stays."""
+    from dataclasses import replace
+
+    for numeric in root.findall("custom/numeric"):
+        name = numeric.get("name", "")
+        if not name.startswith(MASSLESS):
+            continue
+        link = bodies.bodies.get(name[len(MASSLESS) :])
+        if link is None:
+            raise reader.fail(f"custom {name!r}", "names no body of this file")
+        inertia = bodies.links[link].inertia
+        if inertia is not None and inertia.mass == GRAIN:
+            bodies.links[link] = replace(bodies.links[link], inertia=None)
 
 
 def _actuated(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> tuple[str, ...]:

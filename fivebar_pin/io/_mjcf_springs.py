@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin.chain import ClosedChain, frames_by_name
-from fivebar_pin.errors import FiveBarPinError, InvalidInputError, UnknownNameError
+from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._mjcf_reader import MjcfReader
 from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._urdf_text import numbers
@@ -49,6 +49,8 @@ def tendon_springs(
             stated = _stated_length(reader, full, where)
             length = _relaxed_length(model, bodies.rests, ends) if stated == _AUTOMATIC else stated
             springs.append(Spring(*ends, stiffness, length, damping))
+        except FileFormatError:
+            raise
         except FiveBarPinError as error:
             raise reader.fail(where, str(error)) from error
     return tuple(springs)

@@ -1,7 +1,8 @@
 """A chain to MJCF text: bodies at their joints, frames as sites, closures as equalities (see `_mjcf_words`), springs
 as tendons.
 
-A <custom><numeric> entry keeps the order of joints that were not added depth first. A spring on a joint is that joint's
+MuJoCo takes no moving body without mass: one gets a grain of it, and a note that it has none. A <custom><numeric> entry
+keeps the order of joints that were not added depth first. A spring on a joint is that joint's
 own. MJCF has no place for velocity limits, rotor inertias and gear ratios; the URDF and its sidecar keep them.
 """
 
@@ -17,7 +18,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
-from fivebar_pin.io._mjcf import ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf import GRAIN, MASSLESS, ORDER, UNBOUNDED
 from fivebar_pin.io._mjcf_springs import joint_springs_to_write, tendon_lines
 from fivebar_pin.io._mjcf_words import equality_lines
 from fivebar_pin.io._outline import outline
@@ -103,11 +104,18 @@ class _Writer:
         link = stacked[-1].child
         lines = [f"{indent}<body name={quoteattr(link)}{_pose(joint.placement)}>"]
         lines += [self.joint(each, indent + "  ") for each in stacked]
+        inertia = self.heavy(link)
+        stated = f'pos="{numbers(inertia.lever)}" mass="{numbers([inertia.mass])}"'
+        lines.append(f"{indent}  <inertial {stated} {_inertia(inertia)}/>")
+        return [*lines, *self.contents(link, indent + "  "), f"{indent}</body>"]
+
+    def heavy(self, link: str) -> pin.Inertia:
+        """Return the inertia of a moving body; MuJoCo asks for a mass, and a body without one gets a grain of it."""
         inertia = self.tree.links[link].inertia
         if inertia is not None:
-            stated = f'pos="{numbers(inertia.lever)}" mass="{numbers([inertia.mass])}"'
-            lines.append(f"{indent}  <inertial {stated} {_inertia(inertia)}/>")
-        return [*lines, *self.contents(link, indent + "  "), f"{indent}</body>"]
+            return inertia
+        self.numeric.append(f'    <numeric name={quoteattr(MASSLESS + link)} data="1"/>')
+        return pin.Inertia(GRAIN, np.zeros(3), GRAIN * np.eye(3))
 
     def stacked(self, joint: JointEntry) -> list[JointEntry]:
         """Return the joints that share one body: massless links between joints at one place need none of their own."""

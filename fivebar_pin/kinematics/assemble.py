@@ -22,6 +22,7 @@ __all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
 _NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
 _MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once
+_TURNS = 3.0  # half turns, either way, over which searches start for joints that count their turns
 
 
 @finite()
@@ -150,6 +151,7 @@ def closed_from_starts(
 
     rng = np.random.default_rng(seed)
     tangent = rng.uniform(-np.pi, np.pi, (starts, loops.tree.nv)) * loops.column_scale
+    tangent[:, _counted(chain)] *= _TURNS  # wheels of 5 to 2 stand as before after two turns only
     tangent[0] = 0.0
     q = loops.tree.integrate(np.repeat(pin.neutral(chain.model)[None], starts, axis=0), tangent)
     loops.set_actuated(q, x)
@@ -160,6 +162,12 @@ def closed_from_starts(
     good = closed_enough(loops, closed.residual, tolerance)
     good &= ~loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
     return closed.q[good], _smallest(residual_of(loops, found))
+
+
+def _counted(chain: ClosedChain) -> list[int]:
+    """Return the columns of the joints whose turns a closure counts."""
+    names = {name for closure in chain.closures for name in closure.counted}
+    return [int(chain.model.idx_vs[chain.model.getJointId(name)]) for name in sorted(names)]
 
 
 def _smallest(residual: Array) -> Array:

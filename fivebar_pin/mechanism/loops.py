@@ -206,6 +206,14 @@ class Loops:
         r = int(ranks_of(s))
         return np.diag(scale) if r == rows_.size else np.asarray(U[:, :r].T * scale)
 
+    @property
+    def what_to_check(self) -> str:
+        """Which numbers of the chain may be wrong where its loops stay open, in words."""
+        between = any(c.ends for c in self.closures)
+        words = ["the link lengths and the frames of the closures"] if between else []
+        words += ["the ratios and offsets of the couplings"] if not all(c.ends for c in self.closures) else []
+        return ", and ".join(words)
+
     @cached_property
     def _generic(self) -> tuple[Poses, list[Any]]:
         rng = np.random.default_rng(7)
@@ -233,7 +241,7 @@ def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
         )
     return AssemblyError(
         f"the mechanism cannot be assembled {where}: closure {name} stays open by {size:.3g} m or rad. "
-        f"Bring the actuated coordinates within reach, or check the link lengths.{tied}",
+        f"Bring the actuated coordinates within reach, or check {loops.what_to_check}.{tied}",
         closure=name,
         residual=size,
     )

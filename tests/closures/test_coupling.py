@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 
 import mujoco
@@ -16,7 +17,7 @@ from tied_chains import PLANET, RING, SUN, geared_five_bar, planetary_train, rac
 
 import fivebar_pin as fb
 from fivebar_pin.closures import Coupling
-from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
+from fivebar_pin.errors import AssemblyError, FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import loops_of
 
 HINGES = pytest.mark.parametrize("joint", [pin.JointModelRZ, pin.JointModelRUBZ], ids=["angle", "cosine and sine"])
@@ -394,6 +395,93 @@ def test_joints_of_a_coupling_count_their_turns(joint):
     ]
     limits = turned.lowerPositionLimit[0], turned.upperPositionLimit[0]
     assert limits[0] < -1e300 and limits[1] > 1e300
+
+
+TURNS = {
+    "a pair": ({"a": 3.0, "b": 1.0}, 0.0, {"a": 2.0, "b": -6.0}),
+    "the slow wheel leads": ({"a": 1.0, "b": -0.5}, 0.2, {"a": 3.2, "b": 6.0}),
+    "both have turned": ({"a": 2.5, "b": 1.0}, 0.0, {"a": 4.0, "b": -10.0}),
+    "a rack tells the turns": ({"rack": 1.0, "a": -0.05}, 0.0, {"rack": 1.0, "a": 20.0}),
+}
+
+
+def _coupled_home(ratios: dict[str, float], offset: float, angles: dict[str, float], off: float) -> fb.ClosedChain:
+    """Return joints that turn, of cosine and sine, and a rack, with a reference whose angles are off [rad]."""
+    model, q = pin.Model(), []
+    for k, (name, x) in enumerate(angles.items()):
+        add(model, 0, pin.JointModelPX() if name == "rack" else pin.JointModelRUBZ(), at(float(k)), name, body(k))
+        q += [x] if name == "rack" else [np.cos(x + off), np.sin(x + off)]
+    model.referenceConfigurations["home"] = np.array(q)
+    return fb.ClosedChain(model, (Coupling(ratios, offset),), ())
+
+
+@pytest.mark.parametrize(("ratios", "offset", "angles"), TURNS.values(), ids=TURNS)
+@pytest.mark.parametrize("off", [0.0, 1e-7])
+def test_a_configuration_of_cosines_and_sines_gets_the_turns_that_close_it(ratios, offset, angles, off):
+    """Written with seven digits it closes as well as these say."""
+    chain = _coupled_home(ratios, offset, angles, off)
+    home = dict(zip(chain.joints, chain.references["home"], strict=True))
+    assert abs(fb.closure_residual(chain, chain.references["home"])[0]) < 4.0 * off + 1e-12
+    for name, x in angles.items():
+        assert abs(np.exp(1j * home[name]) - np.exp(1j * (x + off * (name != "rack")))) < 1e-12
+
+
+@pytest.mark.parametrize(("ratios", "offset", "angles"), TURNS.values(), ids=TURNS)
+def test_no_turns_are_invented_for_a_configuration_that_is_open(ratios, offset, angles):
+    home = _coupled_home(ratios, offset, angles, 1e-3).references["home"]
+    assert np.abs(home).max() <= np.pi
+
+
+def test_a_belt_over_five_wheels_knows_all_their_turns():
+    model, radii = pin.Model(), np.array([0.1, 0.05, 0.2, 0.15, 0.03])
+    for k in range(5):
+        add(model, 0, pin.JointModelRUBZ(), at(float(k)), f"p{k}", body(k))
+    angles = 1.0 / radii
+    model.referenceConfigurations["home"] = np.stack([np.cos(angles), np.sin(angles)], axis=1).ravel()
+    belt = [Coupling({f"p{k}": radii[k], f"p{k + 1}": -radii[k + 1]}) for k in range(4)]
+    chain = fb.ClosedChain(model, belt, ("p0",))
+    np.testing.assert_allclose(chain.references["home"], angles, rtol=0.0, atol=1e-12)
+
+
+def test_couplings_that_contradict_each_other_are_told_to_be_looked_at():
+    """Two gears of one pair with other offsets: lengths are named only where there are some."""
+    one = pair(2.5)
+    two = fb.ClosedChain(one.model, (*one.closures, Coupling({"a": 5.0, "b": 2.0}, 0.6, name="other")), ("a",))
+    (error,) = [str(p) for p in fb.diagnose(two).problems if p.severity == "error"]
+    assert error.endswith("m or rad. Check the ratios and offsets of the couplings.")
+    with pytest.raises(AssemblyError, match=r"or check the ratios and offsets of the couplings\."):
+        fb.assemble(two, [0.3])
+    free = five_bar((0.3, 0.2, 0.2, 0.25, 2.0))
+    far = fb.ClosedChain(free.model, (*free.closures, Coupling({"left": 1.0, "right": 1.0})), ("left",))
+    with pytest.raises(AssemblyError, match=r"link lengths and the frames of the closures, and the ratios and offsets"):
+        fb.assemble(far, [0.3])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("ratio", "elbow"), [(2.5, 0.1), (2.0, 0.1), (-1.5, 0.2)])
+def test_the_modes_of_a_geared_five_bar_are_the_roots_over_all_turns_of_its_gear(ratio, elbow, seed):
+    """Driven at an elbow it closes where the right crank, which follows the left one, is a3 away from the left arm."""
+    a1, a2, a3, a4, a5 = 0.3, 1.2, 1.0, 0.25, 0.9
+    chain = geared_five_bar(ratio, offset=0.4)[0].with_actuated(("left_elbow",))
+    left = np.linspace(0.0, 4.0 * np.pi, 20_001)
+    tip = a1 * np.exp(1j * left) + a2 * np.exp(1j * (left + elbow))
+    gap = np.abs(tip - a5 - a4 * np.exp(1j * (0.4 - ratio * left))) - a3
+    roots = np.count_nonzero(np.diff(np.sign(gap)))
+    roots = roots if ratio % 1.0 else roots // 2
+    assert len(fb.assembly_modes(chain, [elbow], seed=seed)) == roots > 0
+
+
+def test_forty_wheels_that_do_not_mesh_are_given_up_soon():
+    """The search for their turns would go on for a minute if nothing ended it."""
+    radii, model = np.random.default_rng(0).uniform(0.5, 2.0, 41), pin.Model()
+    for k in range(41):
+        add(model, 0, pin.JointModelRUBZ(), at(float(k)), f"w{k}", body(k))
+    angles = 10.0 / radii + 1e-3 * np.arange(41) ** 2
+    model.referenceConfigurations["home"] = np.stack([np.cos(angles), np.sin(angles)], axis=1).ravel()
+    start = time.perf_counter()
+    chain = fb.ClosedChain(model, [Coupling({f"w{k}": radii[k], f"w{k + 1}": -radii[k + 1]}) for k in range(40)], ())
+    assert time.perf_counter() - start < 15.0
+    assert np.abs(chain.references["home"]).max() <= np.pi
 
 
 OF_VELOCITY = (

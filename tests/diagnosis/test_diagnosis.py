@@ -30,6 +30,7 @@ from mechanisms import (
 import fivebar_pin as fb
 from fivebar_pin import paper
 from fivebar_pin._arrays import block_svd
+from fivebar_pin.closures import Coupling, Distance
 from fivebar_pin.diagnosis import Actuation, diagnose
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -128,6 +129,27 @@ def test_without_a_configuration_a_regular_one_is_taken_and_the_flat_one_is_ment
     d = diagnose(double_four_bar())
     assert (d.mobility, d.is_singular, d.ok) == (1, False, True)
     assert "singular: mobility 3 instead of 1" in texts(d, "warning")
+
+
+@pytest.mark.parametrize("rods", [False, True], ids=["a belt beside a coupler", "two rods"])
+def test_what_shares_a_load_only_off_the_flat_neutral_configuration_is_not_called_determinate(rods):
+    """At zero the pins lie on one line and pull nowhere; anywhere else the redundant members strain each other."""
+    if rods:
+        model = pin.Model()
+        left, right = (add(model, 0, pin.JointModelRZ(), at(x), name, body(1)) for x, name in ((0.0, "a"), (1.0, "b")))
+        ends = [
+            (point(model, left, f"l{k}", p), point(model, right, f"r{k}", p))
+            for k, p in enumerate((at(0.3), at(0.0, 0.3)))
+        ]
+        chain = fb.ClosedChain(model, [Distance(pair, 1.0) for pair in ends], ("a",))
+        shared = [0, 1]
+    else:
+        plain = parallelogram()
+        belt = Coupling({"crank": 1.0, "rocker": -1.0}, name="belt")
+        chain, shared = fb.ClosedChain(plain.model, (*plain.closures, belt), ("crank",)), [1]
+    for d in (diagnose(chain), diagnose(chain, fb.assemble(chain, [0.7], near=np.full(chain.nq, 0.7)))):
+        assert all(not d.determinate_rows[k] for k in shared)
+        assert len(next(r for r in d.redundant if r.scope == "closed").weights) == 2
 
 
 def test_bennett_is_named_as_overconstrained():

@@ -508,6 +508,24 @@ def test_scales_bound_their_quantities_and_tell_round_off_from_results(loads, ca
     assert x.peak("travel") == np.linalg.norm(x.com - x.com[0], axis=1).max() <= 2.0 * x.scale("travel")
 
 
+@pytest.mark.parametrize("law", ["steady", "swinging"])
+def test_a_wheel_with_its_mass_centre_on_the_axis_shakes_nothing_but_round_off(law):
+    """The lever is what 0.1 + 0.2 - 0.3 leaves; the force of it is told as none, with nothing else in the chain."""
+    model = pin.Model()
+    j = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "wheel")
+    model.appendBodyToJoint(
+        j, pin.Inertia(2.0, np.array([0.1 + 0.2 - 0.3, 0.0, 0.0]), 0.05 * np.eye(3)), pin.SE3.Identity()
+    )
+    chain = fb.ClosedChain(model, (), ("wheel",))
+    t = np.linspace(0.0, 1.0, 20)
+    steady = Motion(t, 9.0 * t[:, None], np.full((20, 1), 9.0), np.zeros((20, 1)))
+    moves = laws.harmonic(t, 0.0, 0.5, period=0.7) if law == "swinging" else steady
+    loads = fb.inverse_dynamics(chain, fb.drive(chain, moves))
+    assert 0.0 < np.abs(loads.shaking_force).max() < 1e-12
+    assert loads.peak("shaking_force") == 0.0
+    assert loads.peak("shaking_moment") == (0.0 if law == "steady" else np.abs(loads.torque).max())
+
+
 def test_arguments_are_checked():
     chain = five_bar()
     trajectory = fb.drive(chain, swinging(2.0, 1.0))

@@ -129,6 +129,41 @@ def test_a_saved_chain_comes_back_from_mjcf(tmp_path: Path, seed: int) -> None:
     assert_same(chain, io.load(path), rtol=2e-15)
 
 
+def _massless_ends() -> ClosedChain:
+    """Return a hinge, a massless hinge apart from it, a heavy hinge, and a massless slide at the end."""
+    model, parent = pin.Model(), 0
+    rng = np.random.default_rng(3)
+    joints = (pin.JointModelRZ(), pin.JointModelRY(), pin.JointModelRX(), pin.JointModelPX())
+    for k, joint in enumerate(joints):
+        parent = model.addJoint(parent, joint, random_placement(rng), f"j{k}")
+        model.appendBodyToJoint(parent, pin.Inertia.Zero() if k % 2 else random_inertia(rng), pin.SE3.Identity())
+    return ClosedChain(model, (), ("j0",))
+
+
+def test_mujoco_takes_bodies_without_mass_and_they_come_back_without(tmp_path: Path) -> None:
+    """MuJoCo asks every moving body for a mass; the grain that it gets does not show in the mass matrix."""
+    chain = _massless_ends()
+    (path,) = io.save(chain, tmp_path, formats=("mjcf",))
+    again = io.load(path)
+    np.testing.assert_allclose(again.inertial_parameters, chain.inertial_parameters, rtol=0.0, atol=1e-15)
+    assert not again.inertial_parameters[1::2].any()
+    rng = np.random.default_rng(4)
+    q, v = rng.normal(size=(2, 4))
+    M, bias, _ = witness(path, chain.model, q, v)
+    np.testing.assert_allclose(M, mass_matrix(chain.model, q), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(bias, pin.nle(chain.model, chain.model.createData(), q, v), rtol=0.0, atol=1e-11)
+
+
+def test_a_mass_stated_after_the_note_that_there_is_none_counts(tmp_path: Path) -> None:
+    (path,) = io.save(_massless_ends(), tmp_path, formats=("mjcf",))
+    text = path.read_text()
+    path.write_text(text.replace('mass="1e-14"', 'mass="0.5"', 1))
+    assert io.load(path).inertial_parameters[1, 0] == 0.5
+    path.write_text(text.replace("massless j", "massless k", 1))
+    with pytest.raises(FileFormatError, match=r"custom 'massless k\w+': names no body of this file"):
+        io.load(path)
+
+
 def test_mujoco_agrees_with_the_papers_linkage(tmp_path: Path) -> None:
     """The five-bar written as MJCF has the same mass matrix, bias and closure error in MuJoCo."""
     chain = paper.table_1("I", "unbalanced").chain(gravity=(0.0, -9.81, 0.0))
