@@ -1,4 +1,4 @@
-"""One thread for linear algebra: the matrices of the tests are small, and threads that wait for each other only cost."""
+"""One thread for linear algebra: matrices here are small, and threads that wait for each other only cost."""
 
 from __future__ import annotations
 
