@@ -239,6 +239,8 @@ class Closure(Immutable, metaclass=_Family):
 
     def _settle(self, **fields: object) -> None:
         """Put checked values into the fields of a closure that is being made, and name it."""
+        if not isinstance(self.name, str):
+            raise InvalidInputError(f"name of a {self.kind} closure", self.name, "must be text")
         for key, value in fields.items():
             object.__setattr__(self, key, value)
         object.__setattr__(self, "name", self.name or "~".join(self.joins))

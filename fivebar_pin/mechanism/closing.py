@@ -29,6 +29,7 @@ of them go on (k,); those that do not stay where they are put."""
 
 CLOSED = 1e-12  # closure residual that counts as closed: some thousand units in the last place [m or rad]
 STEP = 0.5  # longest Newton step of a damped search [rad, or chain lengths]
+_BLOCK = 4096  # samples polished at a time, so that what is computed on the way stays in cache
 _POLISHED = 1e-9  # scaled residual below which one more Newton step reaches round-off: it squares it [-]
 _ASTRAY = 1e3  # sum of Newton steps beyond which a sample is given up [rad, or chain lengths]
 
@@ -125,6 +126,9 @@ def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:
     n = q.shape[0]
     if not loops.m:
         return Closed(np.array(q), np.zeros(n), np.zeros(n), np.ones(n), np.ones((n, 0)))
+    if n > _BLOCK:
+        parts = [polish(loops, q[k : k + _BLOCK], iterations=iterations) for k in range(0, n, _BLOCK)]
+        return Closed(*(np.concatenate([getattr(part, name) for part in parts]) for name in Closed.__slots__))
     rule = _Passive(loops, n)
     q = iterate(loops, q, rule, most=iterations)
     return Closed(q, rule.size, rule.correction, rule.sigma, rule.sign)

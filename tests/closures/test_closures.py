@@ -443,3 +443,10 @@ def test_no_way_is_followed_from_a_hinge_back_to_front():
     with pytest.raises(AssemblyError):
         fb.assemble(chain, [], [np.pi])
     np.testing.assert_allclose(fb.assemble(chain, [], [0.0]), [0.0], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [fb.closures.Point, fb.closures.Weld, fb.closures.Distance, fb.closures.Coupling])
+def test_the_name_of_a_closure_is_text(kind):
+    values = {fb.closures.Distance: (("a", "b"), 1.0), fb.closures.Coupling: ({"a": 1.0, "b": 2.0},)}
+    with pytest.raises(InvalidInputError, match=r"name of a .* closure = 3 but must be text"):
+        kind(*values.get(kind, (("a", "b"),)), name=3)
