@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, frozen
+from fivebar_pin._arrays import TINY, Array, Immutable, frozen
 from fivebar_pin.balancing.conditions import BalanceConditions, balance_conditions
 from fivebar_pin.balancing.regressors.measures import Motions
 from fivebar_pin.balancing.sampling import SpaceName, closed_at, random_samples
@@ -24,7 +24,6 @@ from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Branch", "branches", "configurations_meant"]
 
-_NO_OFFSET = 1e-300  # size of offsets that is divided by where there are none [kg]
 _ROUGH = 1e-2  # part of a condition outside another row space that tells branches apart [-]
 
 
@@ -95,5 +94,5 @@ def _alike(a: BalanceConditions, b: BalanceConditions) -> bool:
         return False
     outside = a.basis - (a.basis @ b.basis.T) @ b.basis
     constants = a.offset - a.basis @ b.basis.T @ b.offset
-    size = max(float(np.abs(a.offset).max(initial=0.0)), _NO_OFFSET)
+    size = max(float(np.abs(a.offset).max(initial=0.0)), TINY)
     return bool(np.abs(outside).max(initial=0.0) < _ROUGH and np.abs(constants).max(initial=0.0) < _ROUGH * size)

@@ -24,10 +24,10 @@ from fivebar_pin.balancing.parameters import Space
 from fivebar_pin.balancing.pieces.materials import density_of
 from fivebar_pin.balancing.pieces.piece import SHAPES, Piece
 
-__all__ = ["COLOUR", "Counterweight", "made_for"]
+__all__ = ["COLOUR", "SAME", "Counterweight", "made_for"]
 
 COLOUR = (0.86, 0.36, 0.10, 1.0)  # of every counterweight: by it the viewer knows them, in files too
-_SAME = 1e-6  # difference of realised and promised terms that counts as none [of the term or its size before]
+SAME = 1e-6  # difference of realised and promised terms that counts as none [of the term or its size before]
 _SHOWN = 1e-3  # the same that is worth a word [radii of the piece]
 _RIM = 720  # points of a rim that are asked whether they lie in the region
 
@@ -69,7 +69,7 @@ class Counterweight(Immutable):
         out_of = f", {1e3 * self.overhang:.3g} mm out of its region"
         out = out_of if self.overhang > _SHOWN * self.radius else ""
         own = float(np.abs(self.parameters[4:]).max())
-        off = "" if self.deviation[2] <= _SAME * own else f", inertia off by {self.deviation[2]:.2g} kg m2"
+        off = "" if self.deviation[2] <= SAME * own else f", inertia off by {self.deviation[2]:.2g} kg m2"
         arm = "" if self.arm is None else f", on an arm of {1e3 * self.arm_size[0]:.4g} mm, {self.arm.mass:.4g} kg"
         return f"{self.body}: {self.shape} {size} mm, {self.parameters[0]:.5g} kg at ({place}) mm{arm}{off}{out}"
 

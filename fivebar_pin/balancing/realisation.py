@@ -10,7 +10,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array, Immutable, figures, frozen
 from fivebar_pin.balancing.counterweight_visuals import visuals, with_frames
-from fivebar_pin.balancing.counterweights import Counterweight, made_for
+from fivebar_pin.balancing.counterweights import SAME, Counterweight, made_for
 from fivebar_pin.balancing.design import Design
 from fivebar_pin.balancing.pieces.piece import Piece
 from fivebar_pin.balancing.pieces.stated import piece_of
@@ -19,7 +19,6 @@ from fivebar_pin.errors import InvalidInputError
 
 __all__ = ["Realisation", "realise"]
 
-_SAME = 1e-6  # difference of realised and promised terms that counts as none [of the term or its size before]
 _ROUND_OFF = 1e-12  # difference of terms that is none, whatever their size [their unit]
 _FITS = 2e-5  # length that a piece may stick out of its region, for round-off [chain lengths]
 _EXACT = 1e-9  # residual of the conditions that counts as balanced [of the moving mass]
@@ -94,7 +93,7 @@ class Realisation(Immutable):
         """Whether what was made is balanced, lies in its regions, and has the terms that the design promises."""
         before = {**self.design.terms, **self.design.before}
         same = all(
-            abs(self.terms[k] - x) <= _SAME * max(abs(x), abs(before.get(k, 0.0))) + _ROUND_OFF
+            abs(self.terms[k] - x) <= SAME * max(abs(x), abs(before.get(k, 0.0))) + _ROUND_OFF
             for k, x in self.promised.items()
         )
         reach = self.design.original.length

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable, checked, figures, finite, frozen, reals
+from fivebar_pin._arrays import TINY, Array, Immutable, checked, figures, finite, frozen, reals
 from fivebar_pin.balancing.objectives.objective import Objective, known, named
 from fivebar_pin.balancing.regressors.measures import Measurement, Motions, measure, trajectories
 from fivebar_pin.balancing.regressors.rows import Rows
@@ -23,7 +23,6 @@ from fivebar_pin.errors import InvalidInputError
 __all__ = ["Scores", "score"]
 
 _PHYSICAL = 1e-9  # invariant of the second moments about a mass centre that counts as zero [of their size]
-_TINY = 1e-300  # divides what has no size at all
 _NOISE = 1e-15  # singular values of a factor below this share of the largest are round-off [-]
 _PEAK_VALUES = 2_000_000  # intermediate values per block when peaks are wanted
 _BLOCK = 8192
@@ -132,7 +131,7 @@ def _factors(rows: dict[Objective, Rows], chain: ClosedChain) -> _Factors:
         stacked = np.concatenate([row.F * scale, row.f[..., None]], axis=2).reshape(-1, scale.size + 1)
         R = np.asarray(np.linalg.qr(stacked / np.sqrt(len(row.F)), mode="r"))
         _, s, Vt = np.linalg.svd(R, full_matrices=False)
-        keep = s > _NOISE * max(float(s[0]) if s.size else 0.0, _TINY)
+        keep = s > _NOISE * max(float(s[0]) if s.size else 0.0, TINY)
         W = s[keep, None] * Vt[keep]
         W[np.abs(W) < _NOISE * np.abs(W).max(initial=0.0)] = 0.0
         found.append(W)

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.balancing.sameness import ALIKE
 from fivebar_pin.balancing.sampling import Samples
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.dynamics.elastic import resting_force
@@ -29,7 +30,6 @@ from fivebar_pin.springs import JointSpring, Spring
 __all__ = ["held_by_masses", "required_gravity", "same_springs", "spring_rows", "springs_act"]
 
 _ROUND_OFF = 1e-9  # share of the power of all joints' spring torques that is round-off in their sum [-]
-_ALIKE = 1e-9  # difference up to which placements of frames are the same [m, -]
 
 
 def spring_rows(chain: ClosedChain, samples: Samples) -> tuple[Array, Array]:
@@ -93,5 +93,5 @@ def _same(a: ClosedChain, s: Spring | JointSpring, b: ClosedChain, t: Spring | J
     if isinstance(s, JointSpring) or isinstance(t, JointSpring):
         return replace(s, damping=0.0) == replace(t, damping=0.0)
     ends = [(find_frame(a.model, f), find_frame(b.model, g)) for f, g in ((s.frame1, t.frame1), (s.frame2, t.frame2))]
-    alike = all(f.parentJoint == g.parentJoint and f.placement.isApprox(g.placement, _ALIKE) for f, g in ends)
+    alike = all(f.parentJoint == g.parentJoint and f.placement.isApprox(g.placement, ALIKE) for f, g in ends)
     return alike and (s.stiffness, s.length) == (t.stiffness, t.length)

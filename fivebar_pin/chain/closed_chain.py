@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
+from fivebar_pin.chain.coordinates import q_slice, v_slice
 from fivebar_pin.chain.counting import counting_turns
 from fivebar_pin.chain.frames import frames_by_name
 from fivebar_pin.chain.parameters import Geometry
@@ -164,8 +165,7 @@ class ClosedChain(Immutable):
         if joint not in self.joints:
             raise UnknownNameError("joint", joint, self.joints)
         j = self.model.getJointId(joint)
-        q, v, own = int(self.model.idx_qs[j]), int(self.model.idx_vs[j]), self.model.joints[j]
-        return slice(q, q + int(own.nq)), slice(v, v + int(own.nv))
+        return q_slice(self.model, j), v_slice(self.model, j)
 
     def with_inertias(self, inertias: Mapping[str, pin.Inertia]) -> ClosedChain:
         """Return the same mechanism with other inertias for the named joints' bodies."""

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain.coordinates import q_slice
 from fivebar_pin.chain.turns import Tie, with_turns
 from fivebar_pin.closures import Closure
 
@@ -49,7 +50,7 @@ def counting_turns(model: pin.Model, closures: Iterable[Closure]) -> pin.Model:
     for word in _OF_CONFIGURATION:
         values = np.array(getattr(out, word))
         for j in set(range(1, model.njoints)) - turned:
-            values[_part(out, j)] = np.array(getattr(model, word))[_part(model, j)]
+            values[q_slice(out, j)] = np.array(getattr(model, word))[q_slice(model, j)]
         setattr(out, word, values)
     ties = [_tie(out, closure.counted, *closure.tie) for closure in closures if closure.tie]
     places = [int(out.idx_qs[j]) for j in sorted(turned)]
@@ -74,8 +75,8 @@ def _counted(model: pin.Model, out: pin.Model, turned: set[int], q: Array) -> Ar
     """Return a configuration in the coordinates of the new model."""
     counted = np.zeros(out.nq)
     for j in range(1, model.njoints):
-        mine = q[_part(model, j)]
-        counted[_part(out, j)] = np.arctan2(mine[1], mine[0]) if j in turned else mine
+        mine = q[q_slice(model, j)]
+        counted[q_slice(out, j)] = np.arctan2(mine[1], mine[0]) if j in turned else mine
     return counted
 
 
@@ -85,7 +86,3 @@ def _tie(model: pin.Model, joints: Iterable[str], ratios: Iterable[float], offse
     for joint, ratio in zip(joints, ratios, strict=True):
         c[model.idx_qs[model.getJointId(joint)]] = ratio
     return c, offset
-
-
-def _part(model: pin.Model, j: int) -> slice:
-    return slice(model.idx_qs[j], model.idx_qs[j] + model.nqs[j])

@@ -11,19 +11,15 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
+from fivebar_pin.diagnosis.findings import STILL, owners_of
 from fivebar_pin.mechanism import mobility
-from fivebar_pin.mechanism.closing import closed_enough
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.plane import plane_normal
 
 __all__ = ["Posed", "is_planar", "judge"]
 
-
-_REACHED = 1e-12
-"""Residual of a configuration that counts as closed [m or rad, of the chain's length]."""
-_STILL = 1e-8
-"""Scaled speed below which a joint counts as standing still [-]."""
 
 _OVER = "the loop is overconstrained: it closes only with these exact dimensions"
 
@@ -60,18 +56,18 @@ def judge(chain: ClosedChain, closures: Iterable[Closure], starts: list[Array]) 
         worst = int(np.argmax(gaps))
         text = f"the loop cannot be closed; it stays open by {gaps[worst]:.2g} m or rad"
         return Posed({worst: text}, q, -1, gaps[worst])
-    site = mobility.generic_site(closed, mobility.site_at(loops, q), 0, _REACHED)
+    site = mobility.generic_site(closed, mobility.site_at(loops, q), 0, CLOSED)
     return Posed(_problems(closed, loops, site), q, closed.nv - site.rank)
 
 
 def _close(chain: ClosedChain, starts: list[Array]) -> tuple[Array, bool]:
     loops = loops_of(chain)
-    q, residual = mobility.close_all(chain, np.stack(starts), _REACHED)
-    good = closed_enough(loops, residual, _REACHED)
+    q, residual = mobility.close_all(chain, np.stack(starts), CLOSED)
+    good = closed_enough(loops, residual, CLOSED)
     if good.any():
         return q[int(np.argmax(good))], True
-    best, gap = mobility.first_closed(chain, 0, _REACHED)
-    return best, bool(closed_enough(loops, np.array([gap]), _REACHED)[0])
+    best, gap = mobility.first_closed(chain, 0, CLOSED)
+    return best, bool(closed_enough(loops, np.array([gap]), CLOSED)[0])
 
 
 def _gaps(loops: Loops, q: Array) -> list[float]:
@@ -85,10 +81,10 @@ def _problems(chain: ClosedChain, loops: Loops, site: Configurations) -> dict[in
     for k, c in enumerate(loops.anchored):
         without = np.array(site.J[0])
         without[c.rows] = 0.0
-        if not c.columns.size or not np.abs(site.J[0][c.rows]).max(initial=0.0) > _STILL:
+        if not c.columns.size or not np.abs(site.J[0][c.rows]).max(initial=0.0) > STILL:
             out[k] = "no joint moves the two frames apart: it would hold nothing"
-        elif np.abs(site.free[0][c.columns]).max(initial=0.0) < _STILL:
-            out[k] = f"it would lock {', '.join(_owners(chain, c.columns.tolist()))}"
+        elif np.abs(site.free[0][c.columns]).max(initial=0.0) < STILL:
+            out[k] = f"it would lock {', '.join(owners_of(chain, c.columns))}"
         elif loops.rank(without) == site.rank:
             out[k] = "it follows from the other closures: it takes no freedom away"
         elif site.rank < loops.r and _is_over(loops, site, c.rows):
@@ -100,15 +96,6 @@ def _is_over(loops: Loops, site: Configurations, rows: slice) -> bool:
     """Whether rows of this closure take part in a dependence that holds only where the loops are closed."""
     _, closed = mobility.redundant_combinations(loops, site)
     return bool(np.any(closed[:, rows]))
-
-
-def _owners(chain: ClosedChain, columns: list[int]) -> list[str]:
-    model = chain.model
-    return [
-        str(model.names[j])
-        for j in range(1, model.njoints)
-        if any(model.idx_vs[j] <= k < model.idx_vs[j] + model.nvs[j] for k in columns)
-    ]
 
 
 def is_planar(chain: ClosedChain, joints: tuple[int, int]) -> bool:

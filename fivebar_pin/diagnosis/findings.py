@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.chain.coordinates import q_slice
 from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import Actuation, Finding, RedundantRow
 from fivebar_pin.mechanism.configurations import Configurations
@@ -139,9 +139,9 @@ def about_parts(chain: ClosedChain, here: Configurations, generic: Configuration
     if dead:
         yield Finding("note", f"{', '.join(owners_of(chain, np.array(dead)))} stands still here (dead point)")
     lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
-    outside = np.flatnonzero((here.q[0] < lower - GIVEN) | (here.q[0] > upper + GIVEN))
-    if outside.size:
-        owners = [j for j in range(1, model.njoints) if np.isin(outside, _columns_q(model, j)).any()]
+    outside = (here.q[0] < lower - GIVEN) | (here.q[0] > upper + GIVEN)
+    if outside.any():
+        owners = [j for j in range(1, model.njoints) if outside[q_slice(model, j)].any()]
         names = ", ".join(model.names[j] for j in owners)
         yield Finding("warning", f"the configuration is outside the limits of {names}")
 
@@ -184,7 +184,3 @@ def _parts(chain: ClosedChain) -> list[tuple[str, ...]]:
             group[find(a)] = find(b)
     roots = sorted({find(j) for j in range(1, model.njoints)})
     return [tuple(model.names[j] for j in range(1, model.njoints) if find(j) == root) for root in roots]
-
-
-def _columns_q(model: pin.Model, j: int) -> npt.NDArray[np.intp]:
-    return np.arange(model.idx_qs[j], model.idx_qs[j] + model.joints[j].nq)

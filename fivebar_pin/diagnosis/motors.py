@@ -10,19 +10,17 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable, checked
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.diagnosis.findings import STILL
 from fivebar_pin.mechanism import mobility
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 
 __all__ = ["MotorProposal", "propose_motors"]
 
 
-_REACHED = 1e-12
-"""Residual of a configuration that counts as closed [m or rad, of the chain's length]."""
 _WELL, _BARELY = 0.1, 1e-6
 """Least share of the freedom still undetermined that a joint must have of its own: first choice, and at all [-]."""
-_STILL = 1e-8
-"""Scaled speed below which nothing moves [-]."""
 _NO_LIMIT = 1e30
 """Effort limit from which on there is none [N m or N]."""
 
@@ -63,8 +61,8 @@ def propose_motors(chain: ClosedChain, q: npt.ArrayLike | None = None) -> tuple[
     """
     chain = replace(chain, actuated=())
     loops = loops_of(chain)
-    q = mobility.first_closed(chain, 0, _REACHED)[0] if q is None else checked("q", q, (chain.nq,))
-    site = mobility.generic_site(chain, mobility.site_at(loops, np.array(q)), 0, _REACHED)
+    q = mobility.first_closed(chain, 0, CLOSED)[0] if q is None else checked("q", q, (chain.nq,))
+    site = mobility.generic_site(chain, mobility.site_at(loops, np.array(q)), 0, CLOSED)
     single = [j for j in range(1, chain.model.njoints) if chain.model.nvs[j] == 1]
     idle = _idle(loops, site)
     order = sorted((j for j in single if chain.model.idx_vs[j] not in idle), key=lambda j: _unlikely(chain, j))
@@ -90,7 +88,7 @@ def _basis(chain: ClosedChain, free: Array, order: list[int]) -> list[int]:
 def _idle(loops: Loops, site: Configurations) -> set[int]:
     """Return the coordinates inside a loop that no closure feels in general."""
     inside = {int(k) for c in loops.anchored for k in c.columns}
-    felt = np.abs(site.J[0]).max(axis=0, initial=0.0) > _STILL
+    felt = np.abs(site.J[0]).max(axis=0, initial=0.0) > STILL
     return {k for k in inside if not felt[k]}
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain.coordinates import q_slice, v_slice
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._entries import UNLIMITED, JointEntry, TreeEntry
 from fivebar_pin.io._sidecar import DATA_FIELDS, UNIVERSAL, Sidecar
@@ -241,23 +242,15 @@ def _set_data(model: pin.Model, name: str, entries: Mapping[str, list[float]], b
         if word in _NOT_NEGATIVE and min(values) < 0.0:
             raise FileFormatError(beside, f"joint_data of {name}: {word} = {values} must not be negative")
         _set_entry(model, j, word, np.array(values))
-    for low, high, part in (("lower", "upper", _q_part(model, j)), ("effort_lower", "effort", _v_part(model, j))):
+    for low, high, part in (("lower", "upper", q_slice(model, j)), ("effort_lower", "effort", v_slice(model, j))):
         limits = [getattr(model, DATA_FIELDS[word])[part] for word in (low, high)]
         if np.any(limits[0] > limits[1]):
             stated = " and ".join(f"{word} = {x.tolist()}" for word, x in zip((low, high), limits, strict=True))
             raise FileFormatError(beside, f"joint_data of {name}: {stated}: the lower limit is above the upper")
 
 
-def _q_part(model: pin.Model, j: int) -> slice:
-    return slice(model.idx_qs[j], model.idx_qs[j] + model.nqs[j])
-
-
-def _v_part(model: pin.Model, j: int) -> slice:
-    return slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
-
-
 def _set_entry(model: pin.Model, j: int, word: str, values: Array) -> None:
-    q, v = _q_part(model, j), _v_part(model, j)
+    q, v = q_slice(model, j), v_slice(model, j)
     getattr(model, DATA_FIELDS[word])[q if word in ("lower", "upper") else v] = values
     mirrored = {"effort": "lowerEffortLimit", "velocity": "lowerVelocityLimit", "friction": "lowerDryFrictionLimit"}
     if word in mirrored:

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
+from fivebar_pin.chain.coordinates import q_slice
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
 from fivebar_pin.io._mjcf import GRAIN, MASSLESS, ORDER, UNBOUNDED
@@ -205,7 +206,7 @@ class _Writer:
 
     def qpos(self, j: int, q: Array) -> Array:
         model = self.model
-        mine = q[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]]
+        mine = q[q_slice(model, j)]
         kind = model.joints[j].shortname()
         if kind == "JointModelFreeFlyer":
             world = pin.SE3ToXYZQUAT(model.jointPlacements[j] * pin.XYZQUATToSE3(mine))

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, Visual, find_frame
+from fivebar_pin.chain.coordinates import q_slice, v_slice
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._build import joint_model, set_default_limits
 from fivebar_pin.io._entries import JointEntry, LinkEntry, TreeEntry
@@ -56,10 +57,7 @@ def joint_data(model: pin.Model, j: int, words: tuple[str, ...]) -> dict[str, li
 
 
 def _values(model: pin.Model, j: int, word: str) -> Array:
-    if word in ("lower", "upper"):
-        part = slice(model.idx_qs[j], model.idx_qs[j] + model.nqs[j])
-    else:
-        part = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
+    part = (q_slice if word in ("lower", "upper") else v_slice)(model, j)
     return np.array(getattr(model, DATA_FIELDS[word]), dtype=np.float64)[part]
 
 

@@ -12,13 +12,12 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.diagnosis import Actuation, Diagnosis, diagnose
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.kinematics import assemble, closure_residual
+from fivebar_pin.mechanism.closing import CLOSED
 from fivebar_pin.planar._build import HOME
 from fivebar_pin.planar._parts import GROUND, Link
 
 __all__ = ["closed_at_home"]
 
-_CLOSED = 1e-12
-"""Gap up to which a linkage is closed: round-off of its sketch, and where `assemble` stops [m, relative above 1 m]."""
 _SETS = 4
 """How many sets of motors an error proposes."""
 
@@ -47,7 +46,7 @@ def _check_closed(chain: ClosedChain, found: Diagnosis) -> None:
     if not chain.closures:
         return
     gaps = np.abs(closure_residual(chain, found.q))
-    if gaps.max() <= _CLOSED * max(1.0, chain.length):
+    if gaps.max() <= CLOSED * max(1.0, chain.length):
         return
     rows = [closure.name for closure in chain.closures for _ in closure.row_names]
     worst = rows[int(np.argmax(gaps))]
@@ -89,7 +88,7 @@ def _words(chain: ClosedChain, links: Mapping[str, Link], joint: str) -> str:
 
 def _closed(chain: ClosedChain, home: Array, found: Diagnosis) -> Array:
     """Return home closed: as it is, with the motors held there, or else as near as it comes."""
-    if not chain.closures or np.abs(closure_residual(chain, home)).max() <= _CLOSED:
+    if not chain.closures or np.abs(closure_residual(chain, home)).max() <= CLOSED:
         return home
     try:
         return assemble(chain, home[chain.actuated_index], near=home)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, frozen
 from fivebar_pin.balancing.moments import Moments
 from fivebar_pin.balancing.regions.region import Region, positive
-from fivebar_pin.balancing.regions.shape import Shape
+from fivebar_pin.balancing.regions.shape import Shape, round_overhang
 
 __all__ = ["Ball", "BallShape"]
 
@@ -63,5 +63,4 @@ class BallShape(Shape):
 
     def overhang(self, points: Array, unit: float) -> float:
         """Return the farthest distance beyond the radius."""
-        semi = unit * self.semi_axes
-        return max(0.0, float((np.linalg.norm(points / semi, axis=1).max() - 1.0) * semi.min()))
+        return round_overhang(points, unit * self.semi_axes)

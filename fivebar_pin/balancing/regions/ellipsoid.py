@@ -11,7 +11,7 @@ from fivebar_pin._arrays import Array, checked, frozen
 from fivebar_pin.balancing.forms import fixed_form
 from fivebar_pin.balancing.moments import Moments
 from fivebar_pin.balancing.regions.region import Region, positive
-from fivebar_pin.balancing.regions.shape import Shape
+from fivebar_pin.balancing.regions.shape import Shape, round_overhang
 
 __all__ = ["Ellipsoid", "EllipsoidShape"]
 
@@ -72,5 +72,4 @@ class EllipsoidShape(Shape):
 
     def overhang(self, points: Array, unit: float) -> float:
         """Return how far the ellipsoid would have to grow, in its least semi-axis."""
-        semi = unit * self.semi_axes
-        return max(0.0, float((np.linalg.norm(points / semi, axis=1).max() - 1.0) * semi.min()))
+        return round_overhang(points, unit * self.semi_axes)

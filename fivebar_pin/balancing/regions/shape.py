@@ -12,7 +12,7 @@ from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.balancing.forms import fixed_form
 from fivebar_pin.balancing.moments import Moments
 
-__all__ = ["Shape"]
+__all__ = ["Shape", "round_overhang"]
 
 S = TypeVar("S", bound="Shape")
 
@@ -85,3 +85,8 @@ class Shape(Immutable, ABC):
             at = float(d @ self.center)
             out.append((moments.second(d, d) - 2.0 * at * moments.first(d) + at**2 * moments.m) / a**2)
         return out
+
+
+def round_overhang(points: Array, semi_axes: Array) -> float:
+    """Return how far an ellipsoid about the origin would have to grow, in its least semi-axis, to hold points."""
+    return max(0.0, float((np.linalg.norm(points / semi_axes, axis=1).max() - 1.0) * semi_axes.min()))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.balancing.regions.region import Region
 from fivebar_pin.balancing.setting import Setting
 from fivebar_pin.balancing.variables.asked import material
@@ -20,7 +20,6 @@ from fivebar_pin.errors import InvalidInputError
 __all__ = ["RemovedMaterial"]
 
 _WHOLE = 1e-9  # negative eigenvalue of a pseudo-inertia that is round-off [of its mass, at the chain's length]
-_MASSLESS = 1e-300  # mass that is divided by where a body has none [moving masses]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +53,7 @@ class RemovedMaterial(Variable):
 def _body(setting: Setting, b: int) -> Array:
     """Return the body that material is taken from, which must exist in space and not only in the plane."""
     P = setting.body(b)
-    lowest = float(np.linalg.eigvalsh(P)[0]) / max(float(P[3, 3]), _MASSLESS)
+    lowest = float(np.linalg.eigvalsh(P)[0]) / max(float(P[3, 3]), TINY)
     if lowest < -_WHOLE:
         raise InvalidInputError(
             f"remove: inertia of body {setting.chain.joints[b]}",
