@@ -11,6 +11,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.closures.axis_closure import AxisClosure
 from fivebar_pin.closures.closure import Entry, Mark
 from fivebar_pin.closures.frame_closure import FramePair, point_drift, point_rows, point_selector
+from fivebar_pin.closures.rows import Row, along, tilt
 
 __all__ = ["Cylindrical"]
 
@@ -33,6 +34,12 @@ class Cylindrical(AxisClosure, word="cylindrical"):
     def mark(self) -> Mark:
         """A long pin along the axis."""
         return Mark("pin", np.asarray(self.axis), stretch=_STRETCH)
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Along the two directions across the axis, and the two tilts."""
+        n, across = self.triad
+        return (*(along(t) for t in across), *(tilt(t, n) for t in across))
 
     def residual(self, pair: FramePair) -> Array:
         """Return the two rows across the axis and the two tilts."""

@@ -15,6 +15,7 @@ from fivebar_pin.closures.frame_closure import (
     point_accelerations,
     point_velocity,
 )
+from fivebar_pin.closures.rows import Row, length
 from fivebar_pin.errors import InvalidInputError
 
 __all__ = ["Distance"]
@@ -47,10 +48,16 @@ class Distance(FrameClosure, word="distance"):
         name, hint = f"length of closure {self.name}", "Points that coincide are a closure of kind '3d'."
         if self.length is None:
             raise InvalidInputError(name, None, "must be given: the distance of the two points [m]")
-        length = number(name, self.length)
-        if length <= 0.0:
-            raise InvalidInputError(name, length, "must be positive [m]", hint)
-        object.__setattr__(self, "length", length)
+        value = number(name, self.length)
+        if value <= 0.0:
+            raise InvalidInputError(name, value, "must be positive [m]", hint)
+        object.__setattr__(self, "length", value)
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Its length."""
+        assert self.length is not None
+        return (length(self.length),)
 
     def residual(self, pair: FramePair) -> Array:
         """Return |p_2 - p_1| - length."""

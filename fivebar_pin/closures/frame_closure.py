@@ -19,6 +19,7 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array, all_of, cross, skew
 from fivebar_pin.closures.anchored import Anchored, Segment, TreePoses, TreeRates
 from fivebar_pin.closures.closure import Closure
+from fivebar_pin.closures.rows import Row
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = [
@@ -63,6 +64,11 @@ class FrameClosure(Closure):
         if isinstance(self.frames, str) or len(frames) != 2 or not all(frames):
             raise InvalidInputError("closure frames", self.frames, "must be two frame names")
         self._settle(frames=frames)
+
+    @property
+    @abstractmethod
+    def rows(self) -> tuple[Row, ...]:
+        """Its rows."""
 
     @abstractmethod
     def residual(self, pair: FramePair) -> Array:

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from fivebar_pin._arrays import Array
 from fivebar_pin.closures.frame_closure import FrameClosure, FramePair, point_drift, point_rows, point_selector
+from fivebar_pin.closures.rows import Row, along
 
 __all__ = ["Point"]
 
@@ -18,6 +21,11 @@ class Point(FrameClosure, word="3d"):
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")
     row_units: ClassVar[tuple[str, ...]] = ("m", "m", "m")
     by_points: ClassVar[bool] = True
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Along the three axes."""
+        return tuple(along(axis) for axis in np.eye(3))
 
     def residual(self, pair: FramePair) -> Array:
         """Return R_1^T (p_2 - p_1)."""

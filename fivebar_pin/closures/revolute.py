@@ -11,6 +11,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.closures.axis_closure import AxisClosure
 from fivebar_pin.closures.closure import Entry
 from fivebar_pin.closures.frame_closure import FramePair, point_drift, point_rows, point_selector
+from fivebar_pin.closures.rows import Row, along, tilt
 
 __all__ = ["Revolute"]
 
@@ -24,6 +25,12 @@ class Revolute(AxisClosure, word="revolute"):
     entries: ClassVar[tuple[Entry, ...]] = (
         Entry("axis", 3, "a revolute closure needs its hinge axis, e.g. [0, 0, 1]"),
     )
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Along the three axes, and the two tilts."""
+        n, across = self.triad
+        return (*(along(axis) for axis in np.eye(3)), *(tilt(t, n) for t in across))
 
     def residual(self, pair: FramePair) -> Array:
         """Return the three rows of the points and the two tilts."""

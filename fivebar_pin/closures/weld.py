@@ -10,6 +10,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, cross, skew
 from fivebar_pin.closures.closure import Mark
 from fivebar_pin.closures.frame_closure import FrameClosure, FramePair, point_drift, point_rows, point_selector
+from fivebar_pin.closures.rows import Row, along, turned
 
 __all__ = ["Weld", "log3"]
 
@@ -27,6 +28,11 @@ class Weld(FrameClosure, word="6d"):
     def mark(self) -> Mark:
         """A box."""
         return Mark("box")
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Along the three axes, turned about them."""
+        return (*(along(axis) for axis in np.eye(3)), *(turned(axis) for axis in np.eye(3)))
 
     def residual(self, pair: FramePair) -> Array:
         """Return the three rows of the points and the rotation vector of R_1^T R_2."""

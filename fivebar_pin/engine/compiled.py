@@ -26,7 +26,7 @@ _HERE = Path(__file__).resolve().parent
 
 def compiled(function: F) -> F:
     """Compile a function that other compiled functions call."""
-    made: F = numba.njit(**_OPTIONS)(function)
+    made: F = numba.njit(forceinline=True, **_OPTIONS)(function)
     return made
 
 

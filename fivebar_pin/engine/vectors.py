@@ -1,12 +1,14 @@
-"""Vectors of three and matrices of nine numbers (row by row) as tuples, and where they stand in tables.
+"""Vectors of three and matrices of nine numbers (row by row) as tuples, and where they stand among others.
 
 Tuples of numbers stay in registers; slices of arrays would be counted as references, once for every use.
 """
 
 from __future__ import annotations
 
-import math
+from math import sqrt
 from typing import TypeAlias
+
+import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.compiled import compiled
@@ -15,13 +17,14 @@ __all__ = [
     "Matrix",
     "Vector",
     "add",
-    "axis_of",
+    "axis_at",
     "back",
     "cross",
     "dot",
     "length_of",
     "matrix_at",
     "product",
+    "push",
     "put",
     "put_matrix",
     "scaled",
@@ -35,34 +38,49 @@ Vector: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
 
-@compiled
-def vector_at(table: Array, i: int, k: int) -> Vector:
-    """Return the three numbers from column k on in row i."""
-    return table[i, k], table[i, k + 1], table[i, k + 2]
+_1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(k) for k in range(1, 9))  # places without a sign need no check for it
 
 
 @compiled
-def put(table: Array, i: int, k: int, u: Vector) -> None:
+def vector_at(W: Array, k: int) -> Vector:
+    """Return the three numbers from place k on."""
+    i = np.uint64(k)
+    return W[i], W[i + _1], W[i + _2]
+
+
+@compiled
+def put(W: Array, k: int, u: Vector) -> None:
     """Write them."""
-    table[i, k], table[i, k + 1], table[i, k + 2] = u
+    i = np.uint64(k)
+    W[i], W[i + _1], W[i + _2] = u
 
 
 @compiled
-def matrix_at(table: Array, i: int, k: int) -> Matrix:
-    """Return the nine numbers from column k on in row i."""
-    return (
-        table[i, k], table[i, k + 1], table[i, k + 2],
-        table[i, k + 3], table[i, k + 4], table[i, k + 5],
-        table[i, k + 6], table[i, k + 7], table[i, k + 8],
-    )  # fmt: skip
+def push(W: Array, k: int, u: Vector) -> None:
+    """Add to them."""
+    i = np.uint64(k)
+    W[i], W[i + _1], W[i + _2] = W[i] + u[0], W[i + _1] + u[1], W[i + _2] + u[2]
 
 
 @compiled
-def put_matrix(table: Array, i: int, k: int, A: Matrix) -> None:
+def axis_at(W: Array, k: int) -> Vector:
+    """Return the column of a rotation whose first number stands at place k."""
+    i = np.uint64(k)
+    return W[i], W[i + _3], W[i + _6]
+
+
+@compiled
+def matrix_at(W: Array, k: int) -> Matrix:
+    """Return the nine numbers from place k on."""
+    i = np.uint64(k)
+    return W[i], W[i + _1], W[i + _2], W[i + _3], W[i + _4], W[i + _5], W[i + _6], W[i + _7], W[i + _8]
+
+
+@compiled
+def put_matrix(W: Array, k: int, A: Matrix) -> None:
     """Write them."""
-    table[i, k], table[i, k + 1], table[i, k + 2] = A[0], A[1], A[2]
-    table[i, k + 3], table[i, k + 4], table[i, k + 5] = A[3], A[4], A[5]
-    table[i, k + 6], table[i, k + 7], table[i, k + 8] = A[6], A[7], A[8]
+    i = np.uint64(k)
+    W[i], W[i + _1], W[i + _2], W[i + _3], W[i + _4], W[i + _5], W[i + _6], W[i + _7], W[i + _8] = A
 
 
 @compiled
@@ -87,7 +105,7 @@ def dot(u: Vector, w: Vector) -> float:
 
 @compiled
 def length_of(u: Vector) -> float:
-    return math.sqrt(dot(u, u))
+    return sqrt(dot(u, u))
 
 
 @compiled
@@ -139,13 +157,3 @@ def turned_about_z(A: Matrix, c: float, s: float) -> Matrix:
         c * A[3] + s * A[4], c * A[4] - s * A[3], A[5],
         c * A[6] + s * A[7], c * A[7] - s * A[6], A[8],
     )  # fmt: skip
-
-
-@compiled
-def axis_of(A: Matrix, k: int) -> Vector:
-    """Return axis 0, 1 or 2 (a column) of a rotation."""
-    if k == 2:
-        return A[2], A[5], A[8]
-    if k == 1:
-        return A[1], A[4], A[7]
-    return A[0], A[3], A[6]

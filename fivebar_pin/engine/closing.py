@@ -1,0 +1,85 @@
+"""Closing the loops at one sample: Newton's method in the passive coordinates.
+
+    J_p dx = -c(q),        q <- q + dx
+
+Each step squares the residual. It ends at round-off: as soon as the residual is there, or one step after it has passed
+below what squares to it.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.engine.blocks import factorise, solve
+from fivebar_pin.engine.compiled import compiled
+from fivebar_pin.engine.rows import jacobian, look
+from fivebar_pin.engine.tables import (
+    LEAD,
+    MOVED,
+    NV,
+    RESIDUAL,
+    ROW_SIZE,
+    ROWS,
+    ROWS_END,
+    SCALE,
+    Integers,
+    X,
+)  # fmt: skip
+from fivebar_pin.engine.tree import integrate, place
+
+__all__ = ["close"]
+
+ROUND_OFF = 1e-15  # scaled residual that is round-off of lengths of the chain [-]
+_POLISHED = 1e-9  # scaled residual below which one more step reaches round-off [-]
+_MOST = 8  # steps
+_ASTRAY = 1.0  # largest step of a coordinate that is a correction [rad, or chain lengths]
+
+
+@compiled
+def close(I: Integers, W: Array) -> bool:
+    """Close q by its passive coordinates, and tell whether it is closed; `MOVED` gathers what they move by.
+
+    What the closures are there, and the factors of their passive columns, stand in W.
+    """
+    closed, last, going, steps = False, False, True, 0
+    while going:
+        place(I, W)
+        look(I, W)
+        jacobian(I, W)
+        regular, error = factorise(I, W), largest_residual(I, W)
+        closed = regular and (last or error <= ROUND_OFF)
+        going = regular and not closed and error < inf and steps < _MOST
+        if going:
+            last, steps = error < _POLISHED, steps + 1
+            going = _step(I, W)
+    return closed
+
+
+@compiled
+def largest_residual(I: Integers, W: Array) -> float:
+    """Return the largest residual, scaled; infinite where one is not a number."""
+    most = 0.0
+    for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
+        size = abs(W[I[r + RESIDUAL]])
+        if not size <= most:  # max() would pass over what is not a number
+            most = size if size < inf else inf
+    return most
+
+
+@compiled
+def _step(I: Integers, W: Array) -> bool:
+    """Take one step of Newton, and tell whether it is a correction."""
+    for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
+        W[I[r + LEAD]] = -W[I[r + RESIDUAL]]
+    for k in range(I[NV]):
+        W[I[X] + k] = 0.0
+    solve(I, W)
+    near = True
+    for k in range(I[NV]):
+        step = W[I[X] + k]
+        near = near and abs(step) <= _ASTRAY * W[I[SCALE] + k]
+        W[I[MOVED] + k] += step
+    if near:
+        integrate(I, W, I[X])
+    return near

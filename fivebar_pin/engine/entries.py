@@ -1,0 +1,132 @@
+"""What Python calls: samples one after the other, from its arrays into its arrays."""
+
+from __future__ import annotations
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.engine.bodies import drag, inertia_forces, joint_forces, torques, twists, weigh
+from fivebar_pin.engine.compiled import compiled, entry
+from fivebar_pin.engine.complement import accelerations, velocities
+from fivebar_pin.engine.following import FOLLOWED, advance
+from fivebar_pin.engine.springs import apply, pull
+from fivebar_pin.engine.tables import (
+    A_HERE,
+    CARRIED,
+    DIRECTION,
+    JOINT,
+    N_HERE,
+    NA,
+    NQ,
+    NV,
+    Q_HERE,
+    RESIDUAL,
+    ROW_SIZE,
+    ROWS,
+    ROWS_END,
+    SHAKING,
+    TAU,
+    UNIT,
+    V_HERE,
+    Integers,
+)  # fmt: skip
+from fivebar_pin.engine.tree import accelerate, move, place
+
+__all__ = ["drive", "loads"]
+
+
+@entry
+def drive(
+    I: Integers, W: Array, x_a: Array, v_a: Array, a_a: Array, q: Array, v: Array, a: Array, N: Array, gap: Array
+) -> tuple[int, int]:
+    """Follow the branch of q[0] along a motion (n, na) and write q, v, a, N and the closure residual of each sample.
+
+    Returns:
+        How it ended, see `following`, and the number of samples that were followed.
+    """
+    read(W, I[Q_HERE], q, 0, I[NQ])
+    status, done = FOLLOWED, 0
+    while status == FOLLOWED and done < x_a.shape[0]:
+        status = advance(I, W, x_a[done], done == 0)
+        if status == FOLLOWED:
+            velocities(I, W, v_a[done])
+            accelerations(I, W, a_a[done])
+            write(W, I[Q_HERE], q, done, I[NQ])
+            write(W, I[V_HERE], v, done, I[NV])
+            write(W, I[A_HERE], a, done, I[NV])
+            k = I[N_HERE]
+            for i in range(I[NV]):
+                for b in range(I[NA]):
+                    N[done, i, b] = W[k]
+                    k += 1
+            gap[done] = open_by(I, W)
+            done += 1
+    return status, done
+
+
+@entry
+def loads(
+    I: Integers, W: Array, q: Array, v: Array, a: Array, N: Array, about: Array,
+    links: Integers, points: Array, wrenches: Array, tau: Array, shaking: Array, carried: Array, joint: Array,
+) -> int:  # fmt: skip
+    """Write what the motors need (n, na), the shaking wrench and that of weight and forces from outside (n, 6).
+
+    Args:
+        I, W: the chain and working memory.
+        q, v, a, N: consistent motion (n, ...).
+        about: point of the moments (3,).
+        links, points, wrenches: of forces from outside (k,), (k, 3), (n, k, 6).
+        tau, shaking, carried: are written.
+        joint: what the joints of the open tree need; is written (n, nv).
+
+    Returns:
+        Number of a spring whose force has no direction, else -1.
+    """
+    centre, lost, i = (about[0], about[1], about[2]), -1, 0
+    while lost < 0 and i < q.shape[0]:
+        read(W, I[Q_HERE], q, i, I[NQ])
+        read(W, I[V_HERE], v, i, I[NV])
+        read(W, I[A_HERE], a, i, I[NV])
+        k = I[N_HERE]
+        for m in range(I[NV]):
+            for b in range(I[NA]):
+                W[k] = N[i, m, b]
+                k += 1
+        place(I, W)
+        move(I, W)
+        accelerate(I, W)
+        twists(I, W)
+        inertia_forces(I, W, centre)
+        weigh(I, W, centre)
+        drag(I, W)
+        lost = pull(I, W)
+        apply(I, W, links, points, wrenches, i, centre)
+        torques(I, W)
+        joint_forces(I, W)
+        write(W, I[TAU], tau, i, I[NA])
+        write(W, I[SHAKING], shaking, i, 6)
+        write(W, I[CARRIED], carried, i, 6)
+        write(W, I[JOINT], joint, i, I[NV])
+        i += 1
+    return lost
+
+
+@compiled
+def open_by(I: Integers, W: Array) -> float:
+    """Return the largest residual in the units of the rows [m or rad]."""
+    most = 0.0
+    for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
+        most = max(most, abs(W[I[r + RESIDUAL]]) / W[I[r + DIRECTION] + UNIT])
+    return most
+
+
+@compiled
+def read(W: Array, at: int, table: Array, i: int, count: int) -> None:
+    """Copy row i of a table into working memory."""
+    for k in range(count):
+        W[at + k] = table[i, k]
+
+
+@compiled
+def write(W: Array, at: int, table: Array, i: int, count: int) -> None:
+    """Copy working memory into row i of a table."""
+    for k in range(count):
+        table[i, k] = W[at + k]

@@ -1,0 +1,151 @@
+"""The open tree as the engine sees it: links whose joints turn about or slide along their z axis.
+
+A joint of several axes in a row is several links. Everything that a joint does is read off Pinocchio's joint model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from fivebar_pin._arrays import Array
+from fivebar_pin.engine import tables as e
+from fivebar_pin.errors import InvalidInputError
+
+__all__ = ["Link", "links_of"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """A link, and the joint that carries it.
+
+    Attributes:
+        joint: number of the joint of the model that it belongs to.
+        parent: number of the link that carries it; 0 is the ground.
+        kind: of the joint, see `engine.tables`.
+        q, v: its first places in a configuration and in a velocity.
+        R, p: its axes (3, 3) and origin (3,) on the parent, coordinates zero.
+        axes: the same axes in those of the model's joint (3, 3): the body's are `R @ axes.T`.
+        pitch: lead of a screw [m/rad].
+        columns: axis and motion of every velocity coordinate.
+    """
+
+    joint: int
+    parent: int
+    kind: int
+    q: int
+    v: int
+    R: Array
+    p: Array
+    axes: Array
+    pitch: float
+    columns: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """One of the simple joints that a joint is made of, on the one before."""
+
+    kind: int
+    placement: pin.SE3
+    axis: Array  # in its own axes
+    pitch: float = 0.0
+
+
+_TURN, _SHIFT, _TWIST = ((2, motion) for motion in (e.TURN, e.SHIFT, e.TWIST))
+_COLUMNS: dict[int, tuple[tuple[int, int], ...]] = {
+    e.REVOLUTE: (_TURN,),
+    e.TURNING: (_TURN,),
+    e.SLIDE: (_SHIFT,),
+    e.SCREW: (_TWIST,),
+    e.BALL: tuple((k, e.TURN) for k in range(3)),
+    e.PLANAR: ((0, e.SHIFT), (1, e.SHIFT), _TURN),
+    e.FREE: (*((k, e.SHIFT) for k in range(3)), *((k, e.TURN) for k in range(3))),
+}
+_COORDINATES = {e.TURNING: 2, e.BALL: 4, e.PLANAR: 4, e.FREE: 7}
+_Z = np.array([0.0, 0.0, 1.0])
+_WHOLE = {"JointModelSpherical": e.BALL, "JointModelPlanar": e.PLANAR, "JointModelFreeFlyer": e.FREE}
+
+
+def links_of(model: pin.Model) -> list[Link]:
+    """Return the links of a model without the ground; the last one of a joint carries its body."""
+    links: list[Link] = []
+    last, axes = {0: 0}, {0: np.eye(3)}
+    for j in range(1, model.njoints):
+        parent = last[int(model.parents[j])]
+        q, v = int(model.idx_qs[j]), int(model.idx_vs[j])
+        placement = model.jointPlacements[j]
+        for part in _parts(model, model.joints[j]):
+            turn = _to_z(part.axis)
+            M = placement * part.placement
+            before = axes[parent]
+            columns = _COLUMNS[part.kind]
+            links.append(
+                Link(
+                    j, parent, part.kind, q, v, before.T @ np.array(M.rotation) @ turn,
+                    before.T @ np.array(M.translation), turn, part.pitch, columns,
+                )  # fmt: skip
+            )
+            parent, placement = len(links), pin.SE3.Identity()
+            axes[parent] = turn
+            q, v = q + _COORDINATES.get(part.kind, 1), v + len(columns)
+        last[j] = parent
+    return links
+
+
+def _parts(model: pin.Model, joint: pin.JointModel) -> Iterator[_Part]:
+    """Take a joint apart."""
+    name, here = joint.shortname(), pin.SE3.Identity()
+    if name == "JointModelComposite":
+        composite = joint.extract() if hasattr(joint, "extract") else joint
+        for sub, placement in zip(composite.joints, composite.jointPlacements, strict=True):
+            first = placement
+            for part in _parts(model, sub):
+                yield _Part(part.kind, first * part.placement, part.axis, part.pitch)
+                first = pin.SE3.Identity()
+        return
+    if name in _WHOLE:
+        yield _Part(_WHOLE[name], here, _Z)
+        return
+    S = _subspace(model, joint)
+    linear, angular = S[:3], S[3:]
+    if name == "JointModelTranslation":
+        for k in range(3):
+            yield _Part(e.SLIDE, here, linear[:, k])
+    elif name == "JointModelSphericalZYX":
+        for axis in np.eye(3)[::-1]:
+            yield _Part(e.REVOLUTE, here, axis)
+    elif name == "JointModelUniversal":
+        for k in range(2):
+            yield _Part(e.REVOLUTE, here, angular[:, k])
+    elif joint.nv == 1 and not angular.any():
+        yield _Part(e.SLIDE, here, linear[:, 0])
+    elif joint.nv == 1 and linear.any():
+        yield _Part(e.SCREW, here, angular[:, 0], float(linear[:, 0] @ angular[:, 0]))
+    elif joint.nv == 1:
+        yield _Part(e.REVOLUTE if joint.nq == 1 else e.TURNING, here, angular[:, 0])
+    elif joint.nv:
+        raise InvalidInputError(
+            "joint kind", name, "is not known", "Known are those of one axis, and the composite, universal, spherical, "
+            "translation, planar and free-flyer joints.",
+        )  # fmt: skip
+
+
+def _subspace(model: pin.Model, joint: pin.JointModel) -> Array:
+    """Return the motion subspace of a joint at its neutral configuration (6, nv)."""
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model), np.zeros(model.nv))
+    return np.array(data.S, dtype=np.float64).reshape(6, -1) if joint.nv else np.zeros((6, 0))
+
+
+def _to_z(axis: Array) -> Array:
+    """Return axes (3, 3) whose z is a unit vector; those of coordinate axes come without round-off."""
+    aligned = np.flatnonzero(axis == 1.0)
+    if aligned.size:
+        return np.roll(np.eye(3), -(2 - int(aligned[0])), axis=0)
+    x = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)
