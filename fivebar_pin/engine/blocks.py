@@ -33,6 +33,7 @@ from fivebar_pin.engine.tables import (
     NUMBER,
     PIVOTS,
     RAW,
+    RAW_RHS,
     RHS,
     ROW_LIST,
     SCALE,
@@ -43,7 +44,7 @@ from fivebar_pin.engine.tables import (
     X,
 )  # fmt: skip
 
-__all__ = ["clear", "factorise", "inverse_norm", "mix_in", "solve", "substitute"]
+__all__ = ["combine", "factorise", "inverse_norm", "solve", "substitute"]
 
 _EXPLICIT = 4  # columns up to which the inverse is made
 _ITERATIONS = 2  # of inverse iteration, which is warm: blocks change little from one sample to the next
@@ -140,7 +141,6 @@ def _householder(W: Array, A: int, m: int, n: int) -> float:
 def solve(I: Integers, W: Array) -> None:
     """Solve J x = lead for the passive part of x; its actuated part stands there already."""
     for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
-        clear(I, W, g)
         for i in range(I[g + RAW]):
             r = I[I[g + ROW_LIST] + i]
             k, value = I[r + JACOBIAN0], W[I[r + LEAD]]
@@ -148,28 +148,24 @@ def solve(I: Integers, W: Array) -> None:
                 if I[e + LOCAL] < 0:
                     value -= W[k] * W[I[X] + I[e + COLUMN]]
                 k += 1
-            mix_in(I, W, g, i, value)
+            W[I[RAW_RHS] + i] = value
+        combine(I, W, g)
         substitute(I, W, g)
         for k in range(I[g + WIDTH]):
             W[I[X] + I[I[g + COLUMN_LIST] + k]] = W[I[RHS] + k]
 
 
 @compiled
-def clear(I: Integers, W: Array, g: int) -> None:
-    """Write zeros into the right side of a block."""
-    for h in range(I[RHS], I[RHS] + I[g + HEIGHT]):
-        W[h] = 0.0
-
-
-@compiled
-def mix_in(I: Integers, W: Array, g: int, i: int, value: float) -> None:
-    """Add row i of a block to its right side."""
-    mix = I[g + MIX]
-    if mix < 0:
-        W[I[RHS] + i] = value
-    else:
-        for h in range(I[g + HEIGHT]):
-            W[I[RHS] + h] += W[mix + h * I[g + RAW] + i] * value
+def combine(I: Integers, W: Array, g: int) -> None:
+    """Combine the rows of a right side where those of its block are mixed; the raw ones stand behind, at RAW_RHS."""
+    raw, mix = I[g + RAW], I[g + MIX]
+    for h in range(I[g + HEIGHT]):
+        k, total = mix + h * raw, W[I[RAW_RHS] + h]
+        if mix >= 0:
+            total = 0.0
+            for i in range(raw):
+                total += W[k + i] * W[I[RAW_RHS] + i]
+        W[I[RHS] + h] = total
 
 
 @compiled

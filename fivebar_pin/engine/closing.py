@@ -15,6 +15,8 @@ from fivebar_pin.engine.blocks import factorise, solve
 from fivebar_pin.engine.compiled import compiled
 from fivebar_pin.engine.rows import jacobian, look
 from fivebar_pin.engine.tables import (
+    CLOSED,
+    GOING,
     LEAD,
     MOVED,
     NV,
@@ -37,23 +39,24 @@ _ASTRAY = 1.0  # largest step of a coordinate that is a correction [rad, or chai
 
 
 @compiled
-def close(I: Integers, W: Array) -> bool:
-    """Close q by its passive coordinates, and tell whether it is closed; `MOVED` gathers what they move by.
+def close(I: Integers, W: Array) -> None:
+    """Close q by its passive coordinates and set the flag `CLOSED`; `MOVED` gathers what they move by.
 
     What the closures are there, and the factors of their passive columns, stand in W.
     """
-    closed, last, going, steps = False, False, True, 0
-    while going:
+    last, steps = False, 0
+    W[I[GOING]] = 1.0
+    while W[I[GOING]] == 1.0:
         place(I, W)
         look(I, W)
         jacobian(I, W)
         regular, error = factorise(I, W), largest_residual(I, W)
         closed = regular and (last or error <= ROUND_OFF)
-        going = regular and not closed and error < inf and steps < _MOST
-        if going:
-            last, steps = error < _POLISHED, steps + 1
-            going = _step(I, W)
-    return closed
+        W[I[CLOSED]] = 1.0 if closed else 0.0
+        W[I[GOING]] = 1.0 if regular and not closed and error < inf and steps < _MOST else 0.0
+        last, steps = error < _POLISHED, steps + 1
+        if W[I[GOING]] == 1.0:
+            _step(I, W)
 
 
 @compiled
@@ -68,18 +71,17 @@ def largest_residual(I: Integers, W: Array) -> float:
 
 
 @compiled
-def _step(I: Integers, W: Array) -> bool:
-    """Take one step of Newton, and tell whether it is a correction."""
+def _step(I: Integers, W: Array) -> None:
+    """Take one step of Newton; where it is too long for a correction, none, and the flag `GOING` is taken down."""
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
         W[I[r + LEAD]] = -W[I[r + RESIDUAL]]
     for k in range(I[NV]):
         W[I[X] + k] = 0.0
     solve(I, W)
-    near = True
     for k in range(I[NV]):
         step = W[I[X] + k]
-        near = near and abs(step) <= _ASTRAY * W[I[SCALE] + k]
+        if not abs(step) <= _ASTRAY * W[I[SCALE] + k]:
+            W[I[GOING]] = 0.0
         W[I[MOVED] + k] += step
-    if near:
+    if W[I[GOING]] == 1.0:
         integrate(I, W, I[X])
-    return near

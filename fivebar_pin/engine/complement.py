@@ -1,12 +1,12 @@
 """The natural orthogonal complement at one sample, and the rates that follow [Angeles and Lee 1988].
 
-    J_p N_p = -J_a,    v = N v_a,    J_p a_p = -(J_a a_a + (dJ/dt) v)
+J_p N_p = -J_a,    v = N v_a,    J_p a_p = -(J_a a_a + (dJ/dt) v)
 """
 
 from __future__ import annotations
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.engine.blocks import clear, mix_in, solve, substitute
+from fivebar_pin.engine.blocks import combine, solve, substitute
 from fivebar_pin.engine.compiled import compiled
 from fivebar_pin.engine.rows import drifts
 from fivebar_pin.engine.tables import (
@@ -33,12 +33,16 @@ from fivebar_pin.engine.tables import (
     NV,
     OWNER,
     RAW,
+    RAW_RHS,
     RHS,
     ROW_LIST,
     ROW_SIZE,
     ROWS,
     ROWS_END,
     SCALE,
+    STATUS,
+    TO_A,
+    TO_V,
     V_HERE,
     WIDTH,
     Integers,
@@ -46,13 +50,18 @@ from fivebar_pin.engine.tables import (
 )  # fmt: skip
 from fivebar_pin.engine.tree import accelerate, move
 
-__all__ = ["accelerations", "complement", "velocities"]
+__all__ = ["TOGETHER", "accelerations", "complement", "velocities"]
+
+TOGETHER = 2
+"""Status: motors that closures tie to each other."""
+
+_TIED = 1e-7  # rate of closures at unit speed of a motor from which on they tie it to others [-]
 
 
 @compiled
-def complement(I: Integers, W: Array) -> float:
-    """Write the passive rows of N; return by how much the closures tie the motors to each other, scaled."""
-    tied, na = 0.0, I[NA]
+def complement(I: Integers, W: Array) -> None:
+    """Write the passive rows of N; where the closures tie the motors to each other, `STATUS` says so."""
+    na = I[NA]
     for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
         n, columns = I[g + WIDTH], I[g + COLUMN_LIST]
         for i in range(I[g + MOTOR_LIST], I[g + MOTOR_LIST] + I[g + MOTOR_COUNT]):
@@ -62,14 +71,13 @@ def complement(I: Integers, W: Array) -> float:
             for k in range(n):
                 W[I[N_HERE] + I[columns + k] * na + a] = W[I[RHS] + k]
             for k in range(n, I[g + HEIGHT]):
-                tied = max(tied, abs(W[I[RHS] + k]) * W[I[SCALE] + I[I[MOTORS] + a]])
-    return tied
+                if not abs(W[I[RHS] + k]) * W[I[SCALE] + I[I[MOTORS] + a]] <= _TIED:
+                    W[I[STATUS]] = TOGETHER
 
 
 @compiled
 def _right_side(I: Integers, W: Array, g: int, N: int) -> None:
     """Write what the rows of a block lack at unit speed of one motor, whose column of N begins at W[N]."""
-    clear(I, W, g)
     for i in range(I[g + RAW]):
         r = I[I[g + ROW_LIST] + i]
         k, value = I[r + JACOBIAN0], 0.0
@@ -77,28 +85,29 @@ def _right_side(I: Integers, W: Array, g: int, N: int) -> None:
             if I[e + LOCAL] < 0:
                 value -= W[k] * W[N + I[e + COLUMN] * I[NA]]
             k += 1
-        mix_in(I, W, g, i, value)
+        W[I[RAW_RHS] + i] = value
+    combine(I, W, g)
 
 
 @compiled
-def velocities(I: Integers, W: Array, v_a: Array) -> None:
-    """Write the velocities of all coordinates and links, v = N v_a."""
+def velocities(I: Integers, W: Array) -> None:
+    """Write the velocities of all coordinates and links, v = N v_a, from those of the motors."""
     k = I[COLUMNS] + OWNER
     for i in range(I[NV]):
         g = I[k]
         k += COLUMN_SIZE
         if g < 0:
-            W[I[V_HERE] + i] = v_a[-1 - g]
+            W[I[V_HERE] + i] = W[I[TO_V] - 1 - g]
         else:
             total = 0.0
             for m in range(I[g + MOTOR_LIST], I[g + MOTOR_LIST] + I[g + MOTOR_COUNT]):
-                total += W[I[N_HERE] + i * I[NA] + I[m]] * v_a[I[m]]
+                total += W[I[N_HERE] + i * I[NA] + I[m]] * W[I[TO_V] + I[m]]
             W[I[V_HERE] + i] = total
     move(I, W)
 
 
 @compiled
-def accelerations(I: Integers, W: Array, a_a: Array) -> None:
+def accelerations(I: Integers, W: Array) -> None:
     """Write the accelerations of all coordinates; those of the links are left as at no joint accelerations."""
     for k in range(I[NV]):
         W[I[A_HERE] + k] = 0.0
@@ -107,7 +116,7 @@ def accelerations(I: Integers, W: Array, a_a: Array) -> None:
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
         W[I[r + LEAD]] = -W[I[r + LEAD]]
     for a in range(I[NA]):
-        W[I[X] + I[I[MOTORS] + a]] = a_a[a]
+        W[I[X] + I[I[MOTORS] + a]] = W[I[TO_A] + a]
     solve(I, W)
     for k in range(I[NV]):
         W[I[A_HERE] + k] = W[I[X] + k]

@@ -23,7 +23,11 @@ from fivebar_pin.engine.tables import (
     ROWS,
     ROWS_END,
     SHAKING,
+    STATUS,
     TAU,
+    TO,
+    TO_A,
+    TO_V,
     UNIT,
     V_HERE,
     Integers,
@@ -43,12 +47,16 @@ def drive(
         How it ended, see `following`, and the number of samples that were followed.
     """
     read(W, I[Q_HERE], q, 0, I[NQ])
-    status, done = FOLLOWED, 0
-    while status == FOLLOWED and done < x_a.shape[0]:
-        status = advance(I, W, x_a[done], done == 0)
-        if status == FOLLOWED:
-            velocities(I, W, v_a[done])
-            accelerations(I, W, a_a[done])
+    W[I[STATUS]] = FOLLOWED
+    done = 0
+    while W[I[STATUS]] == FOLLOWED and done < x_a.shape[0]:
+        read(W, I[TO], x_a, done, I[NA])
+        read(W, I[TO_V], v_a, done, I[NA])
+        read(W, I[TO_A], a_a, done, I[NA])
+        advance(I, W, done == 0)
+        if W[I[STATUS]] == FOLLOWED:
+            velocities(I, W)
+            accelerations(I, W)
             write(W, I[Q_HERE], q, done, I[NQ])
             write(W, I[V_HERE], v, done, I[NV])
             write(W, I[A_HERE], a, done, I[NV])
@@ -59,7 +67,7 @@ def drive(
                     k += 1
             gap[done] = open_by(I, W)
             done += 1
-    return status, done
+    return int(W[I[STATUS]]), done
 
 
 @entry

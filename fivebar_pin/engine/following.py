@@ -22,11 +22,12 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.engine.blocks import inverse_norm
 from fivebar_pin.engine.closing import close
 from fivebar_pin.engine.compiled import compiled
-from fivebar_pin.engine.complement import complement
+from fivebar_pin.engine.complement import TOGETHER, complement
 from fivebar_pin.engine.tables import (
     BLOCK_SIZE,
     BLOCKS,
     BLOCKS_END,
+    CLOSED,
     CLOSURE,
     COLUMN,
     COLUMN_LIST,
@@ -62,6 +63,7 @@ from fivebar_pin.engine.tables import (
     POINT,
     Q_BEFORE,
     Q_HERE,
+    RATIOS,
     RAW,
     REACH,
     ROW0,
@@ -71,74 +73,74 @@ from fivebar_pin.engine.tables import (
     SIGNS,
     SIGNS_BEFORE,
     SORT,
+    STATUS,
     TARGET,
-    TIES,
+    TO,
     UNIT,
     WIDTH,
     WRENCH,
     Integers,
 )  # fmt: skip
 from fivebar_pin.engine.tree import integrate, set_coordinate
-from fivebar_pin.engine.vectors import sub, vector_at
+from fivebar_pin.engine.vectors import dot, sub, vector_at
 
 __all__ = ["BLOCKED", "FOLLOWED", "TOGETHER", "advance"]
 
-FOLLOWED, BLOCKED, TOGETHER = 0, 1, 2
-"""How it ended: where it should; a singularity, or nothing closed, on the way; motors that closures tie to each other."""
+FOLLOWED, BLOCKED = 0, 1
+"""Status: it ended where it should; a singularity, or nothing closed, on the way. See also `complement.TOGETHER`."""
 
 LONGEST = 0.5  # longest step of a coordinate that is tried [rad, or chain lengths]
 _SHORTEST = 1e-9  # step of all motors together that is round-off: the way is blocked [rad, or chain lengths]
 _SINGULAR = 1e7  # inverse from which on the motors do not determine the mechanism: 1 / `rank.SINGULAR` [-]
-_TIED = 1e-7  # rate of closures at unit speed of a motor from which on they tie it to others [-]
 _EVEN = 3.0  # ratio of steps up to which the ones before tell how N changes [-]
 
 
 @compiled
-def advance(I: Integers, W: Array, to: Array, first: bool) -> int:
-    """Go on from q, at `TARGET`, along the straight line to other coordinates of the motors, on the same branch.
+def advance(I: Integers, W: Array, first: bool) -> None:
+    """Go on from q, at `TARGET`, along the straight line to `TO`, coordinates of the motors, on the same branch.
 
-    The first time nothing moves: q is closed there already, and becomes the point to go on from.
+    The first time nothing moves: q is closed there already, and becomes the point to go on from. `STATUS` tells how it
+    ended.
     """
-    status, done, total = FOLLOWED, 0.0, 0.0
     if first:
         W[I[REACH]], W[I[LAST_STEP]], W[I[SECOND_STEP]] = inf, 0.0, 0.0
-        step = 1.0
-    else:
-        total = _distance(I, W, to)
-        done = 0.0 if total > 0.0 else 1.0
-        step = min(1.0, 2.0 * W[I[REACH]] / total) if total > 0.0 else 0.0
-    while done < 1.0 and status == FOLLOWED:
+    total = 0.0 if first else _distance(I, W)
+    done = 0.0 if first or total > 0.0 else 1.0
+    step = min(1.0, 2.0 * W[I[REACH]] / total) if total > 0.0 else 1.0
+    W[I[STATUS]] = FOLLOWED
+    while done < 1.0 and W[I[STATUS]] == FOLLOWED:
         step = min(step, 1.0 - done)
         _copy_state(I, W, I[Q_HERE], I[Q_BEFORE], I[J_HERE], I[J_BEFORE], I[SIGNS], I[SIGNS_BEFORE])
-        if (first or _predict(I, W, to, done, step, step * total)) and close(I, W) and _certified(I, W, first):
+        W[I[CLOSED]] = 1.0
+        if not first:
+            _predict(I, W, done, step, step * total)
+        if W[I[CLOSED]] == 1.0:
+            close(I, W)
+        if W[I[CLOSED]] == 1.0:
+            _certify(I, W, first)
+        if W[I[CLOSED]] == 1.0:
             done = done + step if done + step < 1.0 else 1.0
             if not first:
                 W[I[REACH]] = step * total if step < 1.0 else max(step * total, W[I[REACH]])
                 _shift(I, W, step * total)
-            status = _settle(I, W)
+            _settle(I, W)
             step *= 2.0
-        elif first:
-            status = BLOCKED
         else:
             _copy_state(I, W, I[Q_BEFORE], I[Q_HERE], I[J_BEFORE], I[J_HERE], I[SIGNS_BEFORE], I[SIGNS])
             step *= 0.5
             if step * total < _SHORTEST:
-                status = BLOCKED
+                W[I[STATUS]] = BLOCKED
     for a in range(I[NA]):
-        W[I[TARGET] + a] = to[a]
-    return status
+        W[I[TARGET] + a] = W[I[TO] + a]
 
 
 @compiled
-def _settle(I: Integers, W: Array) -> int:
+def _settle(I: Integers, W: Array) -> None:
     """Take q, closed and factorised, for a point of the branch."""
-    status = FOLLOWED
     for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
         if not W[I[NORMS] + I[g + NUMBER]] < _SINGULAR:
-            status = BLOCKED
-    if complement(I, W) > _TIED:
-        status = TOGETHER
-    return status
+            W[I[STATUS]] = BLOCKED
+    complement(I, W)
 
 
 @compiled
@@ -153,26 +155,26 @@ def _copy_state(I: Integers, W: Array, q: int, q_to: int, J: int, J_to: int, sig
 
 
 @compiled
-def _distance(I: Integers, W: Array, to: Array) -> float:
-    """Return the length of the straight line from `TARGET`, scaled."""
+def _distance(I: Integers, W: Array) -> float:
+    """Return the length of the straight line from `TARGET` to `TO`, scaled."""
     total = 0.0
     for a in range(I[NA]):
-        total += ((to[a] - W[I[TARGET] + a]) / W[I[SCALE] + I[I[MOTORS] + a]]) ** 2
+        total += ((W[I[TO] + a] - W[I[TARGET] + a]) / W[I[SCALE] + I[I[MOTORS] + a]]) ** 2
     return sqrt(total)
 
 
 @compiled
-def _predict(I: Integers, W: Array, to: Array, done: float, step: float, h: float) -> bool:
-    """Move q to where it will be after a step of length h; False where this is too far to say.
+def _predict(I: Integers, W: Array, done: float, step: float, h: float) -> None:
+    """Move q to where it will be after a step of length h; where this is too far to say, the flag `CLOSED` is taken down.
 
     N is taken for a parabola in the way, through this point and the two before [Adams and Bashforth 1883]:
 
         δ_p = (N + h/2 D_1 + (h^2 / 3 + h h_1 / 2) D_12) δ_a,     D_1, D_12 its divided differences
     """
     w0, w1, w2 = _weights(h, W[I[LAST_STEP]], W[I[SECOND_STEP]])
-    moved, target, near = I[MOVED], I[TARGET], True
+    moved, target, to = I[MOVED], I[TARGET], I[TO]
     for a in range(I[NA]):
-        W[moved + I[I[MOTORS] + a]] = step * (to[a] - W[target + a])
+        W[moved + I[I[MOTORS] + a]] = step * (W[to + a] - W[target + a])
     for k in range(I[NV]):
         g = I[I[COLUMNS] + COLUMN_SIZE * k + OWNER]
         if g >= 0:
@@ -182,13 +184,13 @@ def _predict(I: Integers, W: Array, to: Array, done: float, step: float, h: floa
                 N = w0 * W[I[N_HERE] + n] + w1 * W[I[N_LAST] + n] + w2 * W[I[N_SECOND] + n]
                 total += N * W[moved + I[I[MOTORS] + I[i]]]
             W[moved + k] = total
-        near = near and abs(W[moved + k]) <= LONGEST * W[I[SCALE] + k]
-    if near:
+        if not abs(W[moved + k]) <= LONGEST * W[I[SCALE] + k]:
+            W[I[CLOSED]] = 0.0
+    if W[I[CLOSED]] == 1.0:
         integrate(I, W, moved)
         for a in range(I[NA]):
-            x = to[a] if done + step >= 1.0 else W[target + a] + (done + step) * (to[a] - W[target + a])
+            x = W[to + a] if done + step >= 1.0 else W[target + a] + (done + step) * (W[to + a] - W[target + a])
             set_coordinate(I, W, I[COLUMNS] + COLUMN_SIZE * I[I[MOTORS] + a], x)
-    return near
 
 
 @compiled
@@ -216,36 +218,33 @@ def _shift(I: Integers, W: Array, h: float) -> None:
 
 
 @compiled
-def _certified(I: Integers, W: Array, first: bool) -> bool:
-    """Tell whether this point and the one before are on one branch, see above; write the norms of the inverses."""
-    one = True
+def _certify(I: Integers, W: Array, first: bool) -> None:
+    """Take the flag `CLOSED` down unless this point and the one before are on one branch; write the inverses' norms."""
     for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
         number = I[g + NUMBER]
-        one = one and (first or W[I[SIGNS] + number] == W[I[SIGNS_BEFORE] + number])
-        if one:
-            W[I[NORMS] + number] = inverse_norm(I, W, g)
-            one = first or _one_branch(I, W, g, max(W[I[NORMS] + number], W[I[NORMS_BEFORE] + number]))
-    return one
+        norm = W[I[NORMS] + number] = inverse_norm(I, W, g)
+        if not first:
+            turned = W[I[SIGNS] + number] != W[I[SIGNS_BEFORE] + number]
+            if turned or not _contraction(I, W, g, max(norm, W[I[NORMS_BEFORE] + number])) <= 0.5:
+                W[I[CLOSED]] = 0.0
 
 
 @compiled
-def _one_branch(I: Integers, W: Array, g: int, beta: float) -> bool:
-    """The same of one block, whose inverses are no larger than beta at both points."""
+def _contraction(I: Integers, W: Array, g: int, beta: float) -> float:
+    """Return the largest β_s K η along the chord, of a block whose inverses are no larger than beta at its ends."""
     n = I[g + WIDTH]
     bend, change, bend_rate, change_rate, slope = 0.0, 0.0, 0.0, 0.0, 0.0  # squares
     for i in range(I[g + RAW]):
         r = I[I[g + ROW_LIST] + i]
         bent, changed = _change(I, W, r)
         bend, change = bend + bent * bent, change + changed
-        c = I[r + CLOSURE]
-        if r == I[c + ROW0] and I[c + TIES] == 0:
-            travel, arm = _travel_and_arm(I, W, r)
-            change_rate += n * (arm * travel * travel) ** 2
-            bend_rate += (arm * travel * travel * travel) ** 2
-            slope += (n * arm) ** 2
+        travel, arm = _travel_and_arm(I, W, r)
+        change_rate += n * (arm * travel * travel) ** 2
+        bend_rate += (arm * travel * travel * travel) ** 2
+        slope += (n * arm) ** 2
     left = 1.0 - beta * (0.5 * sqrt(change) + 0.125 * sqrt(change_rate))
-    eta = 0.125 * beta * (sqrt(bend) + sqrt(bend_rate))  # times left
-    return left > 0.0 and beta * sqrt(slope) * eta <= 0.5 * left * left
+    eta = 0.125 * beta * (sqrt(bend) + sqrt(bend_rate))
+    return beta * sqrt(slope) * eta / (left * left) if left > 0.0 else inf
 
 
 @compiled
@@ -266,14 +265,14 @@ def _travel_and_arm(I: Integers, W: Array, r: int) -> tuple[float, float]:
     """Return how far the joints of a loop have moved together, and the longest arm of one to the closure, scaled.
 
     An arm counts as one at least. A rod of length ρ turns by 1 / ρ for a unit of travel of its ends, which makes its
-    derivatives larger.
+    derivatives larger. Each closure counts once, with its first row; one that ties coordinates is straight.
     """
     point, square, travel = vector_at(W, I[r + WRENCH] + POINT), 0.0, 0.0
-    for e in range(I[r + ENTRIES], I[r + ENTRIES_END], ENTRY_SIZE):
+    curved = r == I[I[r + CLOSURE] + ROW0] and I[r + SORT] != RATIOS
+    for e in range(I[r + ENTRIES], I[r + ENTRIES_END] if curved else I[r + ENTRIES], ENTRY_SIZE):
         travel += abs(W[I[MOVED] + I[e + COLUMN]]) / W[I[SCALE] + I[e + COLUMN]]
         arm = sub(point, vector_at(W, I[e + ENTRY_CENTRE]))
-        square = max(square, arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
-    longest = max(1.0, W[I[r + DIRECTION] + UNIT] * sqrt(square))
-    if I[r + SORT] == LENGTH:
-        longest *= (1.0 + sqrt(square) / W[I[r + DIRECTION] + OFFSET]) ** 2
-    return travel, longest
+        square = max(square, dot(arm, arm))
+    longest = max(1.0, W[I[r + DIRECTION] + UNIT] * sqrt(square)) if curved else 0.0
+    rod = 1.0 + sqrt(square) / W[I[r + DIRECTION] + OFFSET] if I[r + SORT] == LENGTH else 1.0
+    return travel, longest * rod * rod

@@ -1,7 +1,7 @@
 """Springs and dampers at one sample, and forces from outside: what they add to what links and joints need.
 
-    between frames    F = k (|d| - l) + c d|d|/dt   along d = P_2 - P_1, pulling the frames together when positive
-    on a joint        k (q - rest) + b dq/dt
+between frames    F = k (|d| - l) + c d|d|/dt   along d = P_2 - P_1, pulling the frames together when positive
+on a joint        k (q - rest) + b dq/dt
 """
 
 from __future__ import annotations

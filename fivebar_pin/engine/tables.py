@@ -21,6 +21,8 @@ __all__ = ["Integers"]
 
 Integers: TypeAlias = npt.NDArray[np.int64]
 
+# Flags that are set under a condition stand in W: a function that returned them would count references, at 20 ns.
+
 # Numbers of things, in front of I.
 NQ, NV, NA, CONSTANTS, MEMORY = range(5)
 # Where records begin and end in I.
@@ -30,11 +32,11 @@ NQ, NV, NA, CONSTANTS, MEMORY = range(5)
 ) = range(5, 18)  # fmt: skip
 # Places in W: of constants, of the sample at hand, of the points of the branch before it.
 (
-    GRAVITY, SCALE, LOSSES, Q_HERE, V_HERE, A_HERE, X, MOVED, TARGET, JOINT, TAU, SHAKING, CARRIED, RHS, RESIDUALS, J_HERE,
+    GRAVITY, SCALE, LOSSES, Q_HERE, V_HERE, A_HERE, X, MOVED, TARGET, JOINT, TAU, SHAKING, CARRIED, RHS, RAW_RHS, RESIDUALS, J_HERE,
     N_HERE, N_LAST, N_SECOND, Q_BEFORE, J_BEFORE, SIGNS, SIGNS_BEFORE, NORMS, NORMS_BEFORE, REACH, LAST_STEP, SECOND_STEP,
-    POSES, RATES, LOADS, JACOBIAN,
-) = range(18, 50)  # fmt: skip
-HEADER = 50
+    POSES, RATES, LOADS, JACOBIAN, CLOSED, GOING, STATUS, TO, TO_V, TO_A,
+) = range(18, 57)  # fmt: skip
+HEADER = 57
 
 # Fields of a link.
 (
@@ -53,7 +55,9 @@ TURN, SHIFT, HELIX = range(3)
 # Fields of a closure and of its entries, the columns that move it.
 POSE1, POSE2, RATE1, RATE2, FRAMES, ROW0, ROW0_END, ENTRY0, ENTRY0_END, TIES = range(10)
 CLOSURE_SIZE = 10
-COLUMN, SIGN, LOCAL, ENTRY_AXIS, ENTRY_CENTRE, ENTRY_MOTION, ENTRY_PITCH, RATIO = range(8)  # LOCAL: place in its block, or -1
+COLUMN, SIGN, LOCAL, ENTRY_AXIS, ENTRY_CENTRE, ENTRY_MOTION, ENTRY_PITCH, RATIO = range(
+    8
+)  # LOCAL: place in its block, or -1
 ENTRY_SIZE = 8
 
 # Fields of a row.

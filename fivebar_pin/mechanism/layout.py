@@ -265,15 +265,16 @@ class _Layout:
         """Make room in W for what is known of a sample and return the places, by what they are."""
         parts, head = self.parts, self.head
         nq, nv, na, nb = parts.chain.nq, parts.chain.nv, parts.chain.na, len(parts.blocks)
-        links, tall = len(parts.links) + 1, max((max(b.height, b.columns.size) for b in parts.blocks), default=0)
+        links, tall = len(parts.links) + 1, max((max(b.rows.size, b.columns.size) for b in parts.blocks), default=0)
         per_row = [c.columns.size for c, rows in self._with_rows() for _ in self._directions(c, rows)]
         jacobian = sum(per_row)
         head[e.JACOBIAN] = jacobian
         sizes = {
             e.Q_HERE: nq, e.V_HERE: nv, e.A_HERE: nv, e.X: nv, e.MOVED: nv, e.TARGET: na, e.JOINT: nv, e.TAU: na,
-            e.SHAKING: 6, e.CARRIED: 6, e.RHS: tall, e.RESIDUALS: len(per_row), e.Q_BEFORE: nq, e.J_HERE: jacobian,
+            e.SHAKING: 6, e.CARRIED: 6, e.RHS: tall, e.RAW_RHS: tall, e.RESIDUALS: len(per_row), e.Q_BEFORE: nq, e.J_HERE: jacobian,
             e.J_BEFORE: jacobian, e.SIGNS: nb, e.NORMS: nb, e.SIGNS_BEFORE: nb, e.NORMS_BEFORE: nb, e.REACH: 1,
-            e.LAST_STEP: 1, e.SECOND_STEP: 1,
+            e.LAST_STEP: 1, e.SECOND_STEP: 1, e.CLOSED: 1, e.GOING: 1, e.STATUS: 1, e.TO: na,
+            e.TO_V: na, e.TO_A: na,
         }  # fmt: skip
         for field, count in sizes.items():
             head[field] = self._room(count)
@@ -315,7 +316,11 @@ class _Layout:
         return [(start, start + len(x)) for start, x in zip(starts, moves, strict=True)]
 
     def _links(
-        self, constants: dict[str, list[int]], memory: dict[str, list[int]], reached: list[tuple[int, int]], columns: int
+        self,
+        constants: dict[str, list[int]],
+        memory: dict[str, list[int]],
+        reached: list[tuple[int, int]],
+        columns: int,
     ) -> None:
         at = self._begin(e.LINKS, e.LINK_SIZE, len(self.parts.links) + 1)
         ground = Link(0, 0, 0, 0, 0, np.eye(3), np.zeros(3), np.eye(3), 0.0, ())

@@ -85,8 +85,16 @@ def links_of(model: pin.Model) -> list[Link]:
             columns = _COLUMNS[part.kind]
             links.append(
                 Link(
-                    j, parent, part.kind, q, v, before.T @ np.array(M.rotation) @ turn,
-                    before.T @ np.array(M.translation), turn, part.pitch, columns,
+                    j,
+                    parent,
+                    part.kind,
+                    q,
+                    v,
+                    before.T @ np.array(M.rotation) @ turn,
+                    before.T @ np.array(M.translation),
+                    turn,
+                    part.pitch,
+                    columns,
                 )  # fmt: skip
             )
             parent, placement = len(links), pin.SE3.Identity()

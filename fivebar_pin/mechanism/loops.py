@@ -214,6 +214,12 @@ class Loops:
         words += ["the ratios and offsets of the couplings"] if not all(c.ends for c in self.closures) else []
         return ", and ".join(words)
 
+    @property
+    def generic_jacobians(self) -> list[Array]:
+        """The Jacobians of all closures, in their columns, at some generic configurations (n, m, columns) each."""
+        poses, pairs = self._generic
+        return [c.jacobian(x, poses) for c, x in zip(self.anchored, pairs, strict=True)]
+
     @cached_property
     def _generic(self) -> tuple[Poses, list[Any]]:
         rng = np.random.default_rng(7)

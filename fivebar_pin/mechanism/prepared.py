@@ -1,0 +1,100 @@
+"""A chain prepared for the engine: its records, and working memory for every thread."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from fivebar_pin._arrays import Array, seal
+from fivebar_pin.chain import ClosedChain
+from fivebar_pin.closures import Anchored
+from fivebar_pin.closures.frame_closure import AnchoredFrames
+from fivebar_pin.closures.rows import Row
+from fivebar_pin.engine.tables import Integers
+from fivebar_pin.mechanism.layout import Index, Parts, blocks_of, joined_rows, layout_of
+from fivebar_pin.mechanism.links import links_of
+from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.per_chain import once_per_chain
+from fivebar_pin.mechanism.rank import ranks_of
+
+__all__ = ["Prepared", "prepared_of"]
+
+
+class Prepared:
+    """The two vectors of the engine.
+
+    Attributes:
+        I: records of the chain, never written.
+        W: its constants, and working memory as it is before the first sample; never written.
+    """
+
+    def __init__(self, I: Integers, W: Array) -> None:
+        self.I, self.W = I, W
+        for vector in (I, W):
+            seal(vector)
+        self._threads = threading.local()
+
+    def memory(self) -> Array:
+        """Return the working memory of this thread."""
+        if not hasattr(self._threads, "W"):
+            self._threads.W = np.array(self.W)
+        found: Array = self._threads.W
+        return found
+
+
+@once_per_chain
+def prepared_of(chain: ClosedChain) -> Prepared:
+    """Return a chain as the engine sees it, made once."""
+    loops = loops_of(chain)
+    kept = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
+    starts = np.cumsum([0, *(J.shape[1] for _, J in kept)])
+    touched = [c.columns for c, (_, J) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
+    systems = []
+    for group in loops.independent:
+        rows = np.concatenate([np.arange(starts[k], starts[k + 1]) for k in group.members])
+        wide = [_spread(kept[k][1], loops.anchored[k].columns, chain.nv) for k in group.members]
+        systems.append((rows, loops.passive[group.passive], _combinations(np.concatenate(wide))))
+    blocks = blocks_of(systems, touched, chain.actuated_index)
+    rows_kept = [rows for rows, _ in kept]
+    return Prepared(
+        *layout_of(
+            Parts(chain, links_of(chain.model), loops.anchored, rows_kept, blocks, loops.column_scale, loops.length)
+        )
+    )
+
+
+def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], Array]:
+    """Return the rows of a closure without those that say nothing anywhere, and their scaled Jacobian.
+
+    Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane.
+    """
+    J, length = J * loops.column_scale[anchored.columns], loops.length
+    if not isinstance(anchored, AnchoredFrames):
+        return (), J * anchored.row_scale(length, loops.column_scale)[:, None]
+    rows = anchored.closure.rows
+    kept: list[Row] = []
+    scaled: list[Array] = []
+    for sort in dict.fromkeys((row.sort, row.other.tobytes()) for row in rows):
+        some = [k for k, row in enumerate(rows) if (row.sort, row.other.tobytes()) == sort]
+        mine = J[:, some] * (1.0 / length if sort[0] in ("along", "length") else 1.0)
+        U, s, _ = np.linalg.svd(np.concatenate(list(mine), axis=1), full_matrices=False)
+        r = int(ranks_of(s))
+        mix = np.eye(len(some)) if r == len(some) else U[:, :r].T
+        kept += [rows[k] for k in some] if r == len(some) else joined_rows([rows[k] for k in some], mix)
+        scaled.append(np.matmul(mix, mine))
+    return tuple(kept), np.concatenate(scaled, axis=1)
+
+
+def _spread(J: Array, columns: Index, nv: int) -> Array:
+    """Return rows of a closure at all samples side by side, in all columns (rows, n nv)."""
+    whole = np.zeros((J.shape[1], J.shape[0], nv))
+    whole[:, :, columns] = np.swapaxes(J, 0, 1)
+    return whole.reshape(J.shape[1], -1)
+
+
+def _combinations(wide: Array) -> Array | None:
+    """Return the combinations of rows that are independent, or None where all are."""
+    U, s, _ = np.linalg.svd(wide, full_matrices=False)
+    r = int(ranks_of(s))
+    return None if r == wide.shape[0] else np.asarray(U[:, :r].T)
