@@ -53,7 +53,7 @@ def refusals():
     yield lambda: paper.solve(*straight((0.1, 0.1, 0.1, 0.1, 0.2), 0.0))
     yield lambda: paper.solve(*straight((0.1, 0.2, 0.2, 0.1, 0.4), 0.0))
     yield lambda: straight((0.1, 0.1, 0.1, 0.1, 0.2), 0.0)[0].configuration(0.0, 0.0)
-    yield lambda: straight([1e160] * 5, 0.0)[0].configuration(0.4, 1.3)
+    yield lambda: straight((1e160, 1.0, 1.0, 1.0, 1.0), 0.0)[0].configuration(0.4, 1.3)
     for changes, _ in TOO_LARGE:
         yield lambda changes=changes: large(**changes)
 
@@ -131,6 +131,19 @@ def test_angles_are_unwound_as_numpy_does():
     np.testing.assert_allclose(angles, expected, rtol=0.0, atol=1e-9)
 
 
+def test_loops_are_refused_up_to_the_least_triangle_and_counted():
+    """Twice the area of O2 O3 O4 is X, also by Heron's formula."""
+    a2, a3 = 0.3, 0.4
+    psi, gamma = np.array([[0.0, 0.5, np.pi, np.pi], [0.0, 1.2, 0.1, 1.5]])
+    half, b, triangle = np.tan(0.5 * np.stack([psi, gamma], axis=1)), np.empty((4, 4), complex), np.empty((4, 3))
+    d = np.abs(0.5 + 0.1 * np.exp(1j * gamma) - 0.1 * np.exp(1j * psi))
+    squares = (a2 + a3 + d) * (a2 + a3 - d) * (d + a2 - a3) * (d - a2 + a3) / 4.0
+    least = [0.0, *(np.sort(squares)[:-1] + np.sort(squares)[1:]) / 2.0, 1.0]
+    for count, bound in enumerate(least):
+        assert kernels.close_loops(np.array([0.1, a2, a3, 0.1, 0.5]), 1.0, bound, half, b, triangle) == count
+        np.testing.assert_allclose(triangle[:, :2], np.stack([d**2, squares], axis=1), rtol=1e-12)
+
+
 @pytest.mark.parametrize("fast", [0, 1])
 @pytest.mark.parametrize("moving", [0, 1])
 def test_an_interval_is_doubted_for_the_speed_of_either_end_and_of_either_motor(fast, moving):
@@ -146,6 +159,57 @@ def test_an_interval_is_doubted_for_the_speed_of_either_end_and_of_either_motor(
     for share, first in ((0.99, 1), (1.01, 0)):
         q[1, moving] = np.pi / 2 + share * room / (2.0 * 0.1)
         assert kernels.next_doubtful(lengths, t, q, v, triangle, 0) == first
+
+
+@pytest.mark.parametrize(("ends", "doubted"), [((0.45, 0.69), 0), ((0.69, 0.45), 0), ((0.45, 0.67), 1)])
+def test_either_end_of_an_interval_may_be_near_the_reach(ends, doubted):
+    """Links of 0.4 and 0.3 m reach 0.7 m; the way between the samples is 0.01 m, which counts twice."""
+    assert doubt(ends) == doubted
+
+
+@pytest.mark.parametrize(("ends", "doubted"), [((0.4, 0.11), 0), ((0.11, 0.4), 0), ((0.4, 0.13), 1)])
+def test_either_end_of_an_interval_may_be_near_the_fold(ends, doubted):
+    """Links of 0.4 and 0.3 m keep O2 and O4 0.1 m apart."""
+    assert doubt(ends) == doubted
+
+
+def doubt(ends):
+    """Return 0 if the one interval between these distances of O2 and O4 is doubted, or else 1."""
+    triangle = np.zeros((2, 3))
+    triangle[:, 0] = np.square(ends)
+    q = np.array([[0.0, 0.0], [0.1, 0.0]])
+    return kernels.next_doubtful(
+        np.array([0.1, 0.4, 0.3, 0.1, 0.5]), np.array([0.0, 1.0]), q, np.zeros((2, 2)), triangle, 0
+    )
+
+
+@pytest.mark.parametrize("pull", [0.0, 2.0, -2.0])
+def test_weight_across_the_plane_turns_the_frame(pull):
+    """c x m g about O1; without it there is no moment across, and no minus zero in tables."""
+    s = large(v=1.0, gravity=(0.3, 0.0, pull))
+    weight = s.linkage.masses.sum() * np.array([0.0, 0.0, pull])
+    np.testing.assert_allclose(s.frame_moment[0, :2], np.cross(s.com[0], weight)[:2], rtol=1e-14)
+    assert pull or not np.signbit(s.frame_moment[0, :2]).any()
+
+
+@pytest.mark.parametrize(("joint", "axis"), [(0, 0), (0, 1), (4, 0), (4, 1)])
+def test_a_force_that_is_too_large_alone_is_found(joint, axis):
+    """Accelerations grow until just this component of f01 or f40 passes the largest number."""
+    rng = np.random.default_rng(joint + axis)
+    linkage = paper.FiveBar(
+        [2e-6, 1e-5, 1e-5, 4e-6, 4e-6], 1e10 * rng.uniform(0.5, 5.0, 4), [1e-9] * 4, [0.5] * 4, [0.1] * 4
+    )
+    while True:
+        q, a = [[rng.uniform(-np.pi, np.pi), rng.uniform(0.5, 2.0)]], rng.uniform(-1.0, 1.0, (1, 2))
+        s = paper.solve_states(linkage, q, 0.0 * ONE, a)
+        forces = np.abs(s.joint_forces[0])
+        largest = forces[joint, axis]
+        forces[joint, axis] = 0.0
+        if largest > 1.05 * max(forces.max(), np.abs(s.shaking_force).max()):
+            break
+    scale = 1.02 * (np.finfo(float).max / largest)
+    with pytest.raises(InvalidInputError, match=rf"joint_forces\[0, {joint}, {axis}\] = -?inf"):
+        paper.solve_states(linkage, q, 0.0 * ONE, a * scale)
 
 
 @pytest.mark.parametrize(("changes", "words"), TOO_LARGE)

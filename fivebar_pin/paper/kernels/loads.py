@@ -177,6 +177,7 @@ def load(
         put(out.frame_force, i, wx - pull.real, wy - pull.imag, wz)
         put(out.frame_moment, i, mx, my, mz)
         put(out.com, i, cx, cy, 0.0)
-        total += (wx - pull.real) + (wy - pull.imag) + wz + (mx + my) + (mz + moment) + (cx + cy)
+        # not finite where any of the others is: these end the chains in which infinity is carried on
+        total += (wx - pull.real) + (wy - pull.imag) + (mx + my) + (mz + moment) + (cx + cy)
         total += f[0].real + f[0].imag + f[4].real
     return total
