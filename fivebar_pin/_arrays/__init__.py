@@ -4,7 +4,7 @@ from fivebar_pin._arrays.algebra import block_svd, cross, inverse, skew
 from fivebar_pin._arrays.checks import all_of, checked, integer, number, numeric, reals, require_memory
 from fivebar_pin._arrays.immutable import Array, Immutable, frozen, seal
 from fivebar_pin._arrays.lazy import lazy
-from fivebar_pin._arrays.results import finite
+from fivebar_pin._arrays.results import finite, require_finite
 from fivebar_pin._arrays.rounding import ROUND_OFF, TINY, figures, settled, table_text
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "number",
     "numeric",
     "reals",
+    "require_finite",
     "require_memory",
     "seal",
     "settled",

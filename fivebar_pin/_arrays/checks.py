@@ -39,6 +39,8 @@ def reals(name: str, values: npt.ArrayLike) -> Array:
     if given.size and given.dtype.kind not in "fiu":
         kind = _REFUSED.get(given.dtype.kind, f"of type {given.dtype}")
         raise InvalidInputError(name, values, f"must be an array of numbers only; these are {kind}")
+    if given.dtype == np.float64:
+        return given
     with np.errstate(over="ignore"):  # a long double beyond float becomes infinite, which is refused as such
         return given.astype(np.float64, copy=False) if given.size else np.zeros(given.shape)
 
@@ -84,12 +86,11 @@ def checked(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> 
         InvalidInputError: not numeric, wrong shape, or not finite.
     """
     array = numeric(name, values)
-    wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
     if array.ndim != len(shape) or any(s is not None and s != g for s, g in zip(shape, array.shape, strict=True)):
+        wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
         raise InvalidInputError(f"shape of {name}", array.shape, f"must be {wanted}")
-    bad = np.argwhere(~np.isfinite(array))
-    if bad.size:
-        index = tuple(int(i) for i in bad[0])
+    if not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InvalidInputError(f"{name}{list(index)}", float(array[index]), "must be finite")
     return array
 

@@ -34,7 +34,7 @@ def finite(*, open: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], Callable
                     result = compute(*args, **kwargs)
             except (np.linalg.LinAlgError, FloatingPointError, OverflowError) as error:
                 raise InvalidInputError(compute.__name__, str(error.args[-1]), _BEYOND, _SMALLER) from error
-            _require_finite(compute.__name__, result, open)
+            require_finite(compute.__name__, result, open)
             return result
 
         return computed
@@ -46,7 +46,7 @@ _BEYOND = "is beyond what can be computed in double precision"
 _SMALLER = "Check the units and sizes of what was given."
 
 
-def _require_finite(name: str, result: object, open: tuple[str, ...]) -> None:
+def require_finite(name: str, result: object, open: tuple[str, ...] = ()) -> None:
     """Raise for infinity, and for nan outside the results named as open, in arrays and fields that hold them."""
     if isinstance(result, np.ndarray):
         if result.dtype.kind in "fc" and not np.isfinite(result).all():
@@ -56,9 +56,9 @@ def _require_finite(name: str, result: object, open: tuple[str, ...]) -> None:
                 raise InvalidInputError(f"{name}{list(index)}", result[index].item(), _BEYOND, _SMALLER)
     elif is_dataclass(result):
         for f in fields(result):
-            _require_finite(f.name, getattr(result, f.name), open)
+            require_finite(f.name, getattr(result, f.name), open)
     elif isinstance(result, (tuple, Mapping)):
         for key, item in result.items() if isinstance(result, Mapping) else enumerate(result):
-            _require_finite(key if isinstance(key, str) else name, item, open)
+            require_finite(key if isinstance(key, str) else name, item, open)
     elif isinstance(result, float) and name not in open and not np.isfinite(result):
         raise InvalidInputError(name, result, _BEYOND, _SMALLER)

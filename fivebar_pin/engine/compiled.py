@@ -32,7 +32,7 @@ def compiled(function: F) -> F:
 
 def entry(function: F) -> F:
     """Compile a function that Python calls; its machine code is kept for the next process where a place is found."""
-    place = _cache()
+    place = _cache(Path(function.__code__.co_filename).resolve().parent)
     if place is None:
         return compiled(function)
     with _caching_in(place):
@@ -40,13 +40,14 @@ def entry(function: F) -> F:
     return made
 
 
-def _cache() -> Path | None:
+def _cache(home_of_function: Path) -> Path | None:
     """Return a folder for machine code, of its own for each state of the sources; None where nothing can be written.
 
-    Numba looks at the file of the function it is asked for, not at those of the functions that this one calls.
+    Numba looks at the file of the function it is asked for, not at those of the functions that this one calls: they
+    may stand in the folder of that file, and in this one.
     """
     sources = hashlib.sha256()
-    for path in sorted(_HERE.glob("*.py")):
+    for path in sorted({*_HERE.glob("*.py"), *home_of_function.glob("*.py")}):
         sources.update(path.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     asked = numba.config.CACHE_DIR

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import SingularityError
@@ -24,40 +23,29 @@ _HERMITE = np.array(
         [0.0, 0.0, 0.0, 0.5, -1.0, 0.5],
     ]
 )
+_BASIS = np.linspace(0.0, 1.0, _SUBSTEPS + 1)[:, None] ** np.arange(6) @ _HERMITE.T  # (substeps + 1, 6)
 
 
-def check_path(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], reach: Array) -> None:
+def check_path(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], triangle: Array) -> None:
     """Raise when the motion passes a singularity between two samples.
 
-    O2, O3, O4 lie on a line where the distance |O2 O4| reaches a2 + a3 or |a2 - a3|. Intervals that could get there at
-    twice the speed of their ends, or over twice the way between them, are followed in small steps along the quintic
-    that fits q, v, a at both ends.
+    O2, O3, O4 lie on a line where the distance |O2 O4| reaches a2 + a3 or |a2 - a3|. Intervals that could get there
+    are followed in small steps along the quintic that fits q, v, a at both ends.
 
     Args:
         linkage: the linkage.
         t: times (n,) [s].
-        driven: q, v, a of psi and gamma, each (2, n).
-        reach: |O2 O4| at the samples (n,) [m].
+        driven: q, v, a of psi and gamma, each (n, 2), row by row in memory.
+        triangle: from `positions.close` (n, 3).
 
     Raises:
         SingularityError: which interval.
     """
-    if t.size < 2:
-        return
-    low, high = _bounds(linkage)
-    a1, a4 = float(linkage.lengths[0]), float(linkage.lengths[3])
-    speed = np.abs(driven[1]) * np.array([[a1], [a4]])
-    speed = speed[0] + speed[1]
-    spans = np.diff(t)
-    way = np.abs(np.diff(driven[0], axis=1)) * np.array([[a1], [a4]])  # also where the given rates do not tell
-    way = way[0] + way[1]
-    step = 2.0 * max(float(spans.max()) * float(speed.max()), float(way.max()))
-    if low + step < reach.min() and reach.max() < high - step:
-        return
-    steps = 2.0 * np.maximum(spans * np.maximum(speed[1:], speed[:-1]), way)
-    far = np.maximum(reach[1:], reach[:-1]) + steps >= high
-    near = np.minimum(reach[1:], reach[:-1]) - steps <= low
-    _follow(linkage, t, driven, np.flatnonzero(far | near))
+    from fivebar_pin.paper.kernels import next_doubtful
+
+    k = -1
+    while (k := next_doubtful(linkage.lengths, t, driven[0], driven[1], triangle, k + 1)) < t.size - 1:
+        _follow(linkage, t, driven, k)
 
 
 def _bounds(linkage: FiveBar) -> tuple[float, float]:
@@ -71,22 +59,19 @@ def _gap(linkage: FiveBar, q: Array) -> Array:
     return np.asarray(a5 + a4 * np.exp(1j * q[1]) - a1 * np.exp(1j * q[0]))
 
 
-def _follow(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], intervals: npt.NDArray[np.intp]) -> None:
+def _follow(linkage: FiveBar, t: Array, driven: tuple[Array, Array, Array], k: int) -> None:
     low, high = _bounds(linkage)
-    powers = np.linspace(0.0, 1.0, _SUBSTEPS + 1)[:, None] ** np.arange(6)
-    basis = powers @ _HERMITE.T  # (substeps + 1, 6)
-    for k in intervals:
-        h = t[k + 1] - t[k]
-        ends = np.stack([x[:, j] * h**order for j in (k, k + 1) for order, x in enumerate(driven)])  # (6, 2)
-        d = _gap(linkage, (basis @ ends).T)
-        if np.abs(d).max() >= high or np.abs(d).min() <= low or _distance(d) < _MEET * high:
-            raise SingularityError(
-                f"The motion passes a singularity between sample {k}, t = {t[k]:.6g} s, and sample {k + 1}, "
-                f"t = {t[k + 1]:.6g} s: O2, O3 and O4 come to lie on a line. Change the motion or the lengths.",
-                sigma=0.0,
-                sample=int(k),
-                time=float(t[k]),
-            )
+    h = t[k + 1] - t[k]
+    ends = np.stack([x[j] * h**order for j in (k, k + 1) for order, x in enumerate(driven)])  # (6, 2)
+    d = _gap(linkage, (_BASIS @ ends).T)
+    if np.abs(d).max() >= high or np.abs(d).min() <= low or _distance(d) < _MEET * high:
+        raise SingularityError(
+            f"The motion passes a singularity between sample {k}, t = {t[k]:.6g} s, and sample {k + 1}, "
+            f"t = {t[k + 1]:.6g} s: O2, O3 and O4 come to lie on a line. Change the motion or the lengths.",
+            sigma=0.0,
+            sample=k,
+            time=float(t[k]),
+        )
 
 
 def _distance(d: Array) -> float:

@@ -7,6 +7,15 @@ The loop (1) reads b1 + b2 = a5 + b4 + b3. With d = a5 + b4 - b1, the vector fro
 
 solves (2)-(6) without half tangents; the sign of X is the assembly mode. X is also the determinant of the passive
 closure Jacobian, so that X = 0 is the type 2 singularity (O2, O3, O4 on a line).
+
+From b2 theta' - b3 phi' = b4 gamma' - b1 psi' follow the partial derivatives of the passive angles, theta_psi =
+Im(conj(b3) b1) / X and so on, and from its rate, with g = b1 psi'^2 + b2 theta'^2 - b3 phi'^2 - b4 gamma'^2,
+
+    theta'' = Re(conj(b3) g) / X + theta_psi psi'' + theta_gamma gamma'',
+    phi'' = Re(conj(b2) g) / X + phi_psi psi'' + phi_gamma gamma''.
+
+The paper's ratios are r_theta = theta_psi + theta_gamma r_gamma, r_phi = phi_psi + phi_gamma r_gamma; these never
+divide by psi'.
 """
 
 from __future__ import annotations
@@ -16,11 +25,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, Immutable
+from fivebar_pin._arrays import Array, Immutable, finite, require_finite
 from fivebar_pin.errors import AssemblyError, SingularityError
 from fivebar_pin.paper.assembly_mode import AssemblyMode
 
-__all__ = ["CArray", "Pose", "links", "partials", "position"]
+__all__ = ["CArray", "Pose", "close", "in_rows", "position"]
 
 CArray = npt.NDArray[np.complex128]
 
@@ -37,19 +46,14 @@ class Pose(Immutable):
     X: Array
 
 
-def links(
-    lengths: Array,
-    psi: Array,
-    gamma: Array,
-    *,
-    mode: AssemblyMode = AssemblyMode.LEFT,
-    times: Array | None = None,
+def close(
+    lengths: Array, q: Array, *, mode: AssemblyMode = AssemblyMode.LEFT, times: Array | None = None
 ) -> tuple[CArray, Array, Array]:
-    """Return the link vectors b (4, n) [m], X = Im(conj(b2) b3) (n,) [m2] and D = |O2 O4|^2 (n,) [m2].
+    """Return the link vectors b (4, n) [m], the triangle O2 O3 O4 as D, X^2, X (n, 3), and theta, phi (2, n) [rad].
 
     Args:
         lengths: a1 .. a5 (5,) [m].
-        psi, gamma: input angles (n,) [rad].
+        q: psi and gamma (n, 2) [rad], row by row in memory.
         mode: which of the two closures.
         times: times (n,) [s] for the messages.
 
@@ -57,87 +61,26 @@ def links(
         AssemblyError: a sample at which the links do not reach.
         SingularityError: a sample at which O2, O3, O4 lie on a line.
     """
-    a1, a2, a3, a4, a5 = lengths.tolist()
-    b = np.empty((4, psi.size), dtype=np.complex128)
-    b1, b2, b3, b4 = b
-    np.cos(psi, out=b1.real)
-    np.sin(psi, out=b1.imag)
-    np.cos(gamma, out=b4.real)
-    np.sin(gamma, out=b4.imag)
-    b1 *= a1
-    b4 *= a4
-    d = b4 - b1
-    d += a5
-    D = d.real * d.real
-    D += d.imag * d.imag
-    turn = np.empty_like(d)
-    u, X = turn.real, turn.imag
-    np.add(D, a2 * a2 - a3 * a3, out=u)
-    u *= 0.5
-    X2 = a2 * a2 * D
-    X2 -= u * u
-    if psi.size and X2.min() <= (SINGULAR * a2 * a3) ** 2:
-        _refuse(lengths, np.sqrt(D), X2, times)
-    np.sqrt(X2, out=X)
-    if AssemblyMode.parse(mode) is AssemblyMode.RIGHT:
-        np.negative(X, out=X)
-    X = X.copy()
-    turn /= D
-    np.multiply(d, turn, out=b2)
-    np.subtract(b2, d, out=b3)
-    return b, X, D
+    from fivebar_pin.paper.kernels import close_loops
+
+    b, triangle = np.empty((4, len(q)), dtype=np.complex128), np.empty((len(q), 3))
+    if close_loops(lengths, mode.sign, _least(lengths), np.tan(0.5 * q), b, triangle):
+        _refuse(lengths, np.sqrt(triangle[:, 0]), triangle[:, 1], times)
+    return b, triangle, np.arctan2(b[1:3].imag, b[1:3].real)
 
 
-def position(
-    lengths: Array,
-    psi: Array,
-    gamma: Array,
-    *,
-    mode: AssemblyMode = AssemblyMode.LEFT,
-    times: Array | None = None,
-) -> Pose:
-    """Return theta and phi from psi and gamma, (2)-(7), with the branch of (7) kept by atan2; see `links`."""
-    b, X, _ = links(lengths, psi, gamma, mode=mode, times=times)
-    return Pose(np.angle(b[1]), np.angle(b[2]), b, X)
+@finite()
+def position(lengths: Array, psi: Array, gamma: Array, *, mode: AssemblyMode = AssemblyMode.LEFT) -> Pose:
+    """Return theta and phi from psi and gamma, (2)-(7), with the branch of (7) kept by atan2; see `close`."""
+    b, triangle, passive = close(lengths, in_rows(np.stack([psi, gamma], axis=1)), mode=AssemblyMode.parse(mode))
+    return Pose(passive[0], passive[1], b, triangle[:, 2].copy())
 
 
-def partials(b: CArray, X: Array, *, out: Array | None = None) -> Array:
-    """Return P (2, 2, n): [[theta_psi, theta_gamma], [phi_psi, phi_gamma]], partial derivatives of the passive angles.
-
-    From b2 theta' - b3 phi' = b4 gamma' - b1 psi': theta_psi = Im(conj(b3) b1) / X, and so on. The paper's ratios are
-    r_theta = theta_psi + theta_gamma r_gamma, r_phi = phi_psi + phi_gamma r_gamma; these never divide by psi'.
-    """
-    cross = (np.conj(b[2:0:-1])[:, None, :] * b[::3]).imag
-    P = np.empty_like(cross) if out is None else out
-    np.divide(cross[:, 0], X, out=P[:, 0])
-    np.divide(cross[:, 1], -X, out=P[:, 1])
-    return P
-
-
-def passive_acceleration(b: CArray, X: Array, P: Array, rates: Array, driven: Array) -> Array:
-    """Return (theta'', phi'') (2, n) [rad/s2].
-
-    Args:
-        b, X, P: link vectors, determinant and partial derivatives.
-        rates: psi', theta', phi', gamma' (4, n) [rad/s].
-        driven: psi'', gamma'' (2, n) [rad/s2].
-    """
-    pull = b * (rates * rates)  # centripetal terms of each link
-    g = pull[0] + pull[1]
-    g -= pull[2]
-    g -= pull[3]
-    out = (np.conj(b[2:0:-1]) * g).real
-    out /= X
-    out += P[:, 0] * driven[0]
-    out += P[:, 1] * driven[1]
-    return np.asarray(out)
-
-
-def unwrapped(angles: Array) -> Array:
-    """Return angles (k, n) made continuous along the samples."""
-    if angles.shape[1] > 1 and np.abs(np.diff(angles)).max() > np.pi:
-        return np.asarray(np.unwrap(angles, axis=1))
-    return angles
+def in_rows(x: Array) -> Array:
+    """Return x row by row in memory and read-only, the one form that the kernels are compiled for."""
+    rows = np.ascontiguousarray(x)
+    rows.setflags(write=False)
+    return rows
 
 
 def sigma(lengths: Array, X: npt.ArrayLike) -> Array:
@@ -146,11 +89,18 @@ def sigma(lengths: Array, X: npt.ArrayLike) -> Array:
     return np.asarray(sine / np.sqrt(1.0 + np.sqrt(1.0 - sine * sine)))
 
 
-def _refuse(lengths: Array, reach: Array, X2: Array, times: Array | None) -> None:
+def _least(lengths: Array) -> float:
+    """Return X^2 up to which O2, O3, O4 count as on a line [m4]."""
+    area = float(lengths[1]) * float(lengths[2])
+    require_finite("(a2 a3)^2", area * area)
+    return (SINGULAR * area) ** 2
+
+
+def _refuse(lengths: Array, reach: Array, square: Array, times: Array | None) -> None:
     """Raise for the worst of the samples whose loop does not close, or else for the first singular one."""
     a2, a3 = float(lengths[1]), float(lengths[2])
-    small = (SINGULAR * a2 * a3) ** 2
-    open_ = X2 + small < 0.0
+    small = _least(lengths)
+    open_ = square + small < 0.0
     gap = np.maximum(reach - (a2 + a3), abs(a2 - a3) - reach)
     if np.any(open_):
         k = int(np.argmax(gap))
@@ -165,11 +115,11 @@ def _refuse(lengths: Array, reach: Array, X2: Array, times: Array | None) -> Non
             sample=k,
             time=None if times is None else float(times[k]),
         )
-    k = int(np.flatnonzero(X2 - small <= 0.0)[0])
+    k = int(np.flatnonzero(square <= small)[0])
     raise SingularityError(
         f"O2, O3 and O4 lie on a line at {_where(k, times)}: theta and phi are not determined there "
         "(type 2 singularity). Keep the motion away from it.",
-        sigma=float(sigma(lengths, np.sqrt(max(X2[k], 0.0)))),
+        sigma=float(sigma(lengths, np.sqrt(max(square[k], 0.0)))),
         sample=k,
         time=None if times is None else float(times[k]),
     )

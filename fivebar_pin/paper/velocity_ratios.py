@@ -5,7 +5,7 @@ Eliminating theta or phi from the loop gives f(psi, gamma, phi) = 0, (13), and f
     r = -(f_psi + f_gamma r_gamma) / f_x,   r_gamma = gamma'/psi',   (17), (A9)
 
 with x = phi or theta. (18a), (18c), (A10b), (A10c) and the rates (A15) carry slips; every function here takes
-form="repaired" or form="printed". The ratios do not exist where psi' = 0; `kinematics.partials` does.
+form="repaired" or form="printed". The ratios do not exist where psi' = 0; `Solution.partials` do.
 """
 
 from __future__ import annotations

@@ -136,7 +136,7 @@ def test_trajectory_is_consistent_in_the_layout_of_the_chain(case, mode):
 
 
 def test_angles_stay_continuous_over_many_turns():
-    """A linkage whose coupler turns with its crank: no jump of 2 pi, across block borders too."""
+    """A linkage whose coupler turns with its crank: no jump of 2 pi."""
     linkage = paper.FiveBar((0.5, 0.6, 0.6, 0.5, 0.1), (1, 1, 1, 1), (1, 1, 1, 1), (0.5,) * 4, (0.0,) * 4)
     t = np.linspace(0.0, 1.0, 5000)
     turn = 6.0 * np.pi * t
@@ -197,7 +197,7 @@ def test_a_motion_that_leaves_the_reach_names_sample_time_and_gap():
 
 
 def test_sample_numbers_count_from_the_start_of_the_motion():
-    """Also beyond the first block of samples."""
+    """Also late in a long motion."""
     linkage = replace(paper.table_1("I", "unbalanced"), lengths=[0.02, 0.05, 0.05, 0.1, 0.08])
     with pytest.raises(AssemblyError) as caught:
         paper.solve(linkage, swing(linkage, 2.5, 1.35, samples=6000))
