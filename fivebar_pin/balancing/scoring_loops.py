@@ -46,7 +46,7 @@ def _is_physical(pi: Array) -> bool:
     px, py, pz, half = x * per, y * per, z * per, 0.5 * (xx + yy + zz)
     a, b, c = half - xx - x * px, half - yy - y * py, half - zz - z * pz
     d, e, f = -xy - x * py, -xz - x * pz, -yz - y * pz
-    size = abs(half) + x * px + y * py + z * pz
+    size = half + x * px + y * py + z * pz
     trace = a + b + c
     minors = a * b + a * c + b * c - d * d - e * e - f * f
     determinant = a * (b * c - f * f) - d * (d * c - e * f) + e * (d * f - b * e)
