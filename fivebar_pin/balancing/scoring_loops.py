@@ -33,7 +33,7 @@ def first_unphysical(X: Array) -> int:
     return -1
 
 
-@numba.njit(error_model="numpy")  # nothing joined: the decision is that of each rounded step, and of its overflow
+@numba.njit(error_model="numpy", fastmath=False)  # each step rounded: decisions, and overflow, as written
 def _is_physical(pi: Array) -> bool:
     """Tell whether the mass and the second moments about the mass centre are positive semidefinite.
 

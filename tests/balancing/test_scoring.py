@@ -197,6 +197,17 @@ def test_the_first_body_that_is_not_physical_is_named_among_many() -> None:
         score(chain, paths[0], X, terms="added_mass")
 
 
+def test_a_body_whose_invariants_overflow_is_not_physical() -> None:
+    """Infinity less infinity is no number, and is not made one by joining a product and a difference."""
+    chain, paths = five_bar()
+    X = designs(chain, 1)[0]
+    X[2] = [1.0, 0.0, 0.0, 0.0, 2.0, -0.5, 2.0, 0.0, 0.0, 2.0]
+    score(chain, paths[0], X, terms="added_mass")
+    X[2] *= 1e120
+    with pytest.raises(InvalidInputError, match="design 0, body psi"):
+        score(chain, paths[0], X, terms="added_mass")
+
+
 def test_scales_are_those_of_the_largest_numbers_among_all_designs() -> None:
     chain, paths = five_bar()
     X = np.repeat(designs(chain, 1), 5000, axis=0)
