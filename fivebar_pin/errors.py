@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import pickle
 from collections.abc import Iterable
 from itertools import islice
@@ -85,6 +84,8 @@ class UnknownNameError(FiveBarPinError, LookupError):
     """
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+        import difflib
+
         self.kind, self.name, self.known = kind, name, tuple(known)
         close = difflib.get_close_matches(str(name), self.known, n=1)
         meant = f" Did you mean {close[0]!r}?" if close else ""

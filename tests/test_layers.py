@@ -203,6 +203,18 @@ def test_importing_the_library_leaves_heavy_modules_alone():
     assert out.stdout.split() == []
 
 
+def test_asking_for_what_the_library_offers_leaves_heavy_modules_alone_too():
+    """What a function needs, linear algebra, the compiler or the web, is loaded when it is called; pages serve."""
+    heavy = (*HEAVY, "numba", "scipy.linalg", "scipy.sparse", "urllib.request")
+    code = (
+        "import sys, fivebar_pin as fb\n"
+        "[getattr(fb, name) for name in fb.__all__ if name != 'viz']\n"
+        f"print(*[m for m in {heavy!r} if m in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.split() == []
+
+
 def test_an_unknown_attribute_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'five'"):
         _ = fivebar_pin.five

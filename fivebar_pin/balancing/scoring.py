@@ -22,11 +22,9 @@ from fivebar_pin.errors import InvalidInputError
 
 __all__ = ["Scores", "score"]
 
-_PHYSICAL = 1e-9  # invariant of the second moments about a mass centre that counts as zero [of their size]
 _NOISE = 1e-15  # singular values of a factor below this share of the largest are round-off [-]
 _PEAK_VALUES = 2_000_000  # intermediate values per block when peaks are wanted
-_BLOCK = 8192
-_SINGLE = 200_000  # multiplications in a matrix product that stays on one thread
+_BLOCK = 2048  # designs at a time: they stay in cache while they are looked at, measured and scored
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,6 +83,8 @@ def score(
         UnknownNameError: a term that does not exist.
         InvalidInputError: designs of the wrong shape, not finite, or not physical (which one).
     """
+    from fivebar_pin.balancing.scoring_loops import enlarge
+
     given = (terms,) if isinstance(terms, (str, Objective)) else tuple(terms)
     atoms = tuple(dict.fromkeys(named(term, "term") for term in given))
     if not atoms or any(atom.distance for atom in atoms):
@@ -101,14 +101,15 @@ def score(
     block = _BLOCK
     if whole:
         block = max(1, min(block, _PEAK_VALUES // max(r.F.shape[0] * r.F.shape[1] for r in whole)))
-    out = {atom: np.empty(len(X)) for atom in atoms}
+    out, largest = {atom: np.empty(len(X)) for atom in atoms}, np.zeros(X.shape[1:])
     for start in range(0, len(X), block):
         part = slice(start, min(start + block, len(X)))
-        _require_physical(X[part], start, chain)
-        _fill(out, part, X[part].reshape(part.stop - start, -1), factors, measurement)
+        some = np.ascontiguousarray(X[part])
+        _require_physical(some, start, chain)
+        enlarge(largest, some)
+        _fill(out, part, some.reshape(len(some), -1), factors, measurement)
         if progress is not None:
             progress(part.stop, len(X))
-    largest = np.abs(X).max(axis=0, initial=0.0)
     scales = {atom.name: atom.size(measurement, largest) for atom in atoms}
     values = MappingProxyType({atom.name: frozen(x) for atom, x in out.items()})
     return Scores(values, MappingProxyType(scales))
@@ -116,10 +117,10 @@ def score(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Factors:
-    """All triangular factors side by side: rms of a term = |(x[columns] @ W + w)[parts[term]]|."""
+    """All triangular factors one below the other: rms of a term = |(W @ x[columns] + w)[parts[term]]|."""
 
     columns: npt.NDArray[np.intp]
-    W: Array  # (columns, r)
+    W: Array  # (r, columns)
     w: Array  # (r,)
     parts: dict[Objective, slice]
 
@@ -139,37 +140,21 @@ def _factors(rows: dict[Objective, Rows], chain: ClosedChain) -> _Factors:
         done += len(W)
     both = np.concatenate(found)
     columns = np.flatnonzero(np.any(both[:, :-1], axis=0))
-    return _Factors(columns, np.ascontiguousarray((both[:, columns] / scale[columns]).T), both[:, -1], parts)
+    W, w = both[:, columns] / scale[columns], both[:, -1]
+    return _Factors(columns, np.ascontiguousarray(W), np.ascontiguousarray(w), parts)
 
 
 def _fill(out: dict[Objective, Array], part: slice, x: Array, factors: _Factors, measurement: Measurement) -> None:
-    squares: dict[Objective, Array] = {}
-    if factors.parts:
-        y = _product(x.take(factors.columns, axis=1), factors.W)
-        y += factors.w
-        squares = {root: np.einsum("kr,kr->k", y[:, s], y[:, s]) for root, s in factors.parts.items()}
+    from fivebar_pin.balancing.scoring_loops import squares
+
+    ends = np.array([rows.stop for rows in factors.parts.values()], dtype=np.intp)
+    found = dict(zip(factors.parts, squares(x, factors.columns, factors.W, factors.w, ends), strict=True))
     for atom, values in out.items():
-        if atom.root in squares:
-            square = squares[atom.root]
+        if atom.root in found:
+            square = found[atom.root]
             values[part] = square if atom.squared else np.sqrt(square)
         else:
             values[part] = atom.values(measurement, x)
-
-
-def _product(x: Array, W: Array) -> Array:
-    """Return x @ W in pieces too small for the linear algebra library to spread them over threads.
-
-    Waiting for each other, its threads make products of this shape up to ten times slower.
-    """
-    if not W.size:
-        return np.zeros((len(x), W.shape[1]))
-    rows = max(1, _SINGLE // W.size)
-    whole = len(x) // rows * rows
-    out = np.empty((len(x), W.shape[1]))
-    pieces = out[:whole].reshape(-1, rows, W.shape[1])
-    np.matmul(x[:whole].reshape(-1, rows, W.shape[0]), W, out=pieces)
-    np.matmul(x[whole:], W, out=out[whole:])
-    return out
 
 
 def _designs(chain: ClosedChain, designs: npt.ArrayLike) -> Array:
@@ -181,24 +166,13 @@ def _designs(chain: ClosedChain, designs: npt.ArrayLike) -> Array:
     return X
 
 
-def _require_physical(X: Array, start: int, chain: ClosedChain, tolerance: float = _PHYSICAL) -> None:
-    """Raise for a body whose second moments about its mass centre are not positive semidefinite.
+def _require_physical(X: Array, start: int, chain: ClosedChain) -> None:
+    """Raise for the first body whose mass or second moments about its mass centre are negative."""
+    from fivebar_pin.balancing.scoring_loops import first_unphysical
 
-    A symmetric matrix is so when its three invariants are not negative.
-    """
-    m, x, y, z, xx, xy, yy, xz, yz, zz = np.ascontiguousarray(np.moveaxis(X, 2, 0))
-    with np.errstate(all="ignore"):  # nan fails every comparison below
-        per = 1.0 / np.where(m > 0.0, m, 1.0)
-        px, py, pz, half = x * per, y * per, z * per, 0.5 * (xx + yy + zz)
-        a, b, c = half - xx - x * px, half - yy - y * py, half - zz - z * pz
-        d, e, f = -xy - x * py, -xz - x * pz, -yz - y * pz
-        size = np.abs(half) + x * px + y * py + z * pz
-        ok = (m >= 0.0) & (m < np.inf) & (a + b + c >= -tolerance * size)
-        ok &= a * b + a * c + b * c - d * d - e * e - f * f >= -tolerance * size**2
-        ok &= a * (b * c - f * f) - d * (d * c - e * f) + e * (d * f - b * e) >= -tolerance * size**3
-        ok &= (m > 0.0) | ((x == 0.0) & (y == 0.0) & (z == 0.0))
-    if not ok.all():
-        k, body = (int(i) for i in np.argwhere(~ok)[0])
+    first = first_unphysical(X)
+    if first >= 0:
+        k, body = divmod(first, X.shape[1])
         raise InvalidInputError(
             f"design {start + k}, body {chain.joints[body]}",
             [float(v) for v in X[k, body]],

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from xml.etree import ElementTree
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +17,7 @@ from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._mjcf_reader import MjcfReader
 from fivebar_pin.io._mjcf_tree import BodyTree
-from fivebar_pin.io._urdf_text import numbers
+from fivebar_pin.io._urdf_text import numbers, quoted
 from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["joint_springs_to_write", "tendon_lines", "tendon_springs"]
@@ -81,7 +80,7 @@ def tendon_lines(chain: ClosedChain, site: Callable[[str], str]) -> list[str]:
             words = f'stiffness="{numbers([spring.stiffness])}" springlength="{numbers([spring.length])}"'
             if spring.damping:
                 words += f' damping="{numbers([spring.damping])}"'
-            ends = "".join(f"<site site={quoteattr(site(f))}/>" for f in (spring.frame1, spring.frame2))
+            ends = "".join(f"<site site={quoted(site(f))}/>" for f in (spring.frame1, spring.frame2))
             lines.append(f"    <spatial {words}>{ends}</spatial>")
     return lines
 

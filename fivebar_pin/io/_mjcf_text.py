@@ -9,7 +9,6 @@ own. MJCF has no place for velocity limits, rotor inertias and gear ratios; the 
 from __future__ import annotations
 
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +22,7 @@ from fivebar_pin.io._mjcf import GRAIN, MASSLESS, ORDER, UNBOUNDED
 from fivebar_pin.io._mjcf_springs import joint_springs_to_write, tendon_lines
 from fivebar_pin.io._mjcf_words import equality_lines
 from fivebar_pin.io._outline import outline
-from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers
+from fivebar_pin.io._urdf_text import configurations, mesh_name, numbers, quoted
 
 __all__ = ["mjcf_text"]
 
@@ -65,12 +64,12 @@ class _Writer:
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
             self.numeric.append(f'    <numeric name="{ORDER}" data="{places}"/>')
-        motors = [f"    <motor name={quoteattr(a)} joint={quoteattr(a)}/>" for a in self.chain.actuated]
+        motors = [f"    <motor name={quoted(a)} joint={quoted(a)}/>" for a in self.chain.actuated]
         gravity = numbers(self.model.gravity.linear)
-        meshes = [f"    <mesh name={quoteattr(n)} file={quoteattr(f)}/>" for f, n in self.meshes.items()]
+        meshes = [f"    <mesh name={quoted(n)} file={quoted(f)}/>" for f, n in self.meshes.items()]
         lines = [
             '<?xml version="1.0" encoding="utf-8"?>',
-            f"<mujoco model={quoteattr(self.tree.name)}>",
+            f"<mujoco model={quoted(self.tree.name)}>",
             '  <compiler angle="radian" autolimits="true" inertiafromgeom="false"/>',
             f'  <option gravity="{gravity}"/>',
             *_section("asset", meshes),
@@ -89,10 +88,10 @@ class _Writer:
         """Return what stands inside a body: its shapes, its sites and the bodies it carries."""
         lines = [line for visual in self.tree.links[link].visuals for line in self.geom(visual, np.eye(4), indent)]
         for name, M in self.extra_sites.get(link, []):
-            lines.append(f"{indent}<site name={quoteattr(name)}{_pose(M)}/>")
+            lines.append(f"{indent}<site name={quoted(name)}{_pose(M)}/>")
         for joint in self.below.get(link, []):
             if joint.kind == "fixed":
-                lines.append(f"{indent}<site name={quoteattr(joint.child)}{_pose(joint.placement)}/>")
+                lines.append(f"{indent}<site name={quoted(joint.child)}{_pose(joint.placement)}/>")
                 for visual in self.tree.links[joint.child].visuals:
                     lines += self.geom(visual, joint.placement, indent)
         moving = [joint for joint in self.below.get(link, []) if joint.kind != "fixed"]
@@ -103,7 +102,7 @@ class _Writer:
     def body(self, joint: JointEntry, indent: str) -> list[str]:
         stacked = self.stacked(joint)
         link = stacked[-1].child
-        lines = [f"{indent}<body name={quoteattr(link)}{_pose(joint.placement)}>"]
+        lines = [f"{indent}<body name={quoted(link)}{_pose(joint.placement)}>"]
         lines += [self.joint(each, indent + "  ") for each in stacked]
         inertia = self.heavy(link)
         stated = f'pos="{numbers(inertia.lever)}" mass="{numbers([inertia.mass])}"'
@@ -115,7 +114,7 @@ class _Writer:
         inertia = self.tree.links[link].inertia
         if inertia is not None:
             return inertia
-        self.numeric.append(f'    <numeric name={quoteattr(MASSLESS + link)} data="1"/>')
+        self.numeric.append(f'    <numeric name={quoted(MASSLESS + link)} data="1"/>')
         return pin.Inertia(GRAIN, np.zeros(3), GRAIN * np.eye(3))
 
     def stacked(self, joint: JointEntry) -> list[JointEntry]:
@@ -141,13 +140,13 @@ class _Writer:
             raise InvalidInputError(f"kind of joint {joint.name}", short, "has no word in MJCF", hint)
         if kind == "free" and joint.parent != self.tree.root:
             raise InvalidInputError(f"joint {joint.name}", "free", "must hang on the world in MJCF")
-        words = [f"name={quoteattr(joint.name)}", f'type="{kind}"']
+        words = [f"name={quoted(joint.name)}", f'type="{kind}"']
         v = slice(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])
         if kind in ("hinge", "slide"):
             words.append(f'axis="{numbers(joint.axis)}"')
             words += self.limits(joint, j)
         if joint.kind == "continuous":
-            self.numeric.append(f'    <numeric name={quoteattr(UNBOUNDED + joint.name)} data="1"/>')
+            self.numeric.append(f'    <numeric name={quoted(UNBOUNDED + joint.name)} data="1"/>')
         fields = {"damping": "damping", "frictionloss": "upperDryFrictionLimit", "armature": "armature"}
         for word, field in fields.items():
             values = np.array(getattr(model, field))[v]
@@ -201,7 +200,7 @@ class _Writer:
         lines = []
         for name, q in configurations(self.model):
             qpos = np.concatenate([self.qpos(j, q) for j in self.order])
-            lines.append(f'    <key name={quoteattr(name)} qpos="{numbers(qpos)}"/>')
+            lines.append(f'    <key name={quoted(name)} qpos="{numbers(qpos)}"/>')
         return lines
 
     def qpos(self, j: int, q: Array) -> Array:
@@ -223,7 +222,7 @@ class _Writer:
             shape = f'type="sphere" size="{numbers(size)}"'
         elif visual.shape == "mesh":
             file = mesh_name(visual.mesh, self.folder)
-            shape = f'type="mesh" mesh={quoteattr(self.meshes.setdefault(file, f"mesh{len(self.meshes)}"))}'
+            shape = f'type="mesh" mesh={quoted(self.meshes.setdefault(file, f"mesh{len(self.meshes)}"))}'
         else:
             shape = f'type="{visual.shape}" size="{numbers([size[0], 0.5 * size[1]])}"'
         rest = f'rgba="{numbers(visual.rgba)}" contype="0" conaffinity="0" mass="0"'

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, Protocol
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pinocchio as pin
@@ -20,7 +19,7 @@ from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.closures import Closure, Coupling, Distance, Point, Revolute, Weld
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._mjcf_equality import FACTOR, HINGE
-from fivebar_pin.io._urdf_text import numbers
+from fivebar_pin.io._urdf_text import numbers, quoted
 
 __all__ = ["Writer", "equality_lines"]
 
@@ -65,7 +64,7 @@ def _hinge(writer: Writer, closure: Revolute) -> list[str]:
     offset[:3, 3] = axis * writer.chain.length
     sites = [writer.site(name) for name in closure.frames]
     seconds = [writer.second_site(name, offset) for name in closure.frames]
-    writer.numeric.append(f'    <numeric name={quoteattr(HINGE + closure.name)} data="{numbers(axis)}"/>')
+    writer.numeric.append(f'    <numeric name={quoted(HINGE + closure.name)} data="{numbers(axis)}"/>')
     return [
         _between("connect", closure.name, sites),
         _between("connect", f"{closure.name} axis", seconds),
@@ -80,23 +79,23 @@ def _rod(writer: Writer, closure: Distance) -> list[str]:
     frames = [find_frame(model, name) for name in closure.frames]
     one, two = (data.oMi[f.parentJoint].act(f.placement.translation) for f in frames)
     longer = float(closure.length or 0.0) - float(np.linalg.norm(two - one))
-    name = quoteattr(closure.name)
-    ends = "".join(f"<site site={quoteattr(site)}/>" for site in sites)
+    name = quoted(closure.name)
+    ends = "".join(f"<site site={quoted(site)}/>" for site in sites)
     writer.tendons.append(f"    <spatial name={name}>{ends}</spatial>")
     return [f'    <tendon name={name} tendon1={name} polycoef="{numbers([longer, 0.0, 0.0, 0.0, 0.0])}"/>']
 
 
 def _coupling(writer: Writer, closure: Coupling) -> list[str]:
-    name, joints, offset = quoteattr(closure.name), list(closure.ratios), closure.offset
+    name, joints, offset = quoted(closure.name), list(closure.ratios), closure.offset
     if len(joints) > 2:
-        parts = "".join(f'<joint joint={quoteattr(j)} coef="{numbers([c])}"/>' for j, c in closure.ratios.items())
+        parts = "".join(f'<joint joint={quoted(j)} coef="{numbers([c])}"/>' for j, c in closure.ratios.items())
         writer.tendons.append(f"    <fixed name={name}>{parts}</fixed>")
         return [f'    <tendon name={name} tendon1={name} polycoef="{numbers([offset, 0.0, 0.0, 0.0, 0.0])}"/>']
     first, *rest = closure.ratios.values()
     if first != 1.0:
-        writer.numeric.append(f'    <numeric name={quoteattr(FACTOR + closure.name)} data="{numbers([first])}"/>')
+        writer.numeric.append(f'    <numeric name={quoted(FACTOR + closure.name)} data="{numbers([first])}"/>')
     terms = numbers([offset / first, *[-c / first for c in rest or (0.0,)], 0.0, 0.0, 0.0])
-    tied = " ".join(f"joint{k}={quoteattr(joint)}" for k, joint in enumerate(joints, start=1))
+    tied = " ".join(f"joint{k}={quoted(joint)}" for k, joint in enumerate(joints, start=1))
     return [f'    <joint name={name} {tied} polycoef="{terms}"/>']
 
 
@@ -110,4 +109,4 @@ _WORDS: dict[type[Closure], Callable[[Writer, Any], list[str]]] = {
 
 
 def _between(tag: str, name: str, sites: list[str]) -> str:
-    return f"    <{tag} name={quoteattr(name)} site1={quoteattr(sites[0])} site2={quoteattr(sites[1])}/>"
+    return f"    <{tag} name={quoted(name)} site1={quoted(sites[0])} site2={quoted(sites[1])}/>"

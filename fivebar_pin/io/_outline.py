@@ -31,7 +31,7 @@ _OTHER_KINDS = {
     "JointModelSphericalZYX": "SPHERICAL_ZYX",
     "JointModelTranslation": "TRANSLATION",
 }
-_UNWRITABLE = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_UNWRITABLE = "[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def outline(chain: ClosedChain) -> TreeEntry:
@@ -100,7 +100,7 @@ class _Outline:
         self.place_visuals(set(self.link_of_joint) | set(extra.values()))
         links = [*self.link_of_joint, *extra.values()]
         for name in [*links, *self.joints, self.chain.name]:
-            if not name.strip() or _UNWRITABLE.search(name):
+            if not name.strip() or re.search(_UNWRITABLE, name):
                 raise InvalidInputError("name", name, "must be printable text to be written to a file")
         if len(set(links)) != len(links):
             raise InvalidInputError(

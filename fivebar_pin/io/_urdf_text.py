@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +17,7 @@ from fivebar_pin.io._entries import UNLIMITED, JointEntry, LinkEntry, TreeEntry,
 from fivebar_pin.io._outline import joint_data, outline
 from fivebar_pin.io._sidecar import DATA_WORDS, Sidecar
 
-__all__ = ["configurations", "mesh_name", "numbers", "urdf_and_sidecar"]
+__all__ = ["configurations", "mesh_name", "numbers", "quoted", "urdf_and_sidecar"]
 
 GRAVITY = (0.0, 0.0, -9.81)
 _ONE_AXIS = ("revolute", "continuous", "prismatic")
@@ -30,7 +29,7 @@ _IN_URDF = (*_IN_URDF_IF_CONTINUOUS, "lower", "upper")
 def urdf_and_sidecar(chain: ClosedChain, folder: Path) -> tuple[str, Sidecar]:
     """Return the URDF text of a chain, with meshes named relative to `folder`, and what only the sidecar can say."""
     tree = _uncounted(chain, outline(chain))
-    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(tree.name)}>"]
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoted(tree.name)}>"]
     for link in tree.links.values():
         lines += _link(link, folder)
     for joint in tree.joints.values():
@@ -63,6 +62,13 @@ def numbers(values: Iterable[float] | Array) -> str:
     if not all(np.isfinite(values)):
         raise InvalidInputError("number to write", values, "must be finite")
     return " ".join(repr(float(x) + 0.0) for x in values)
+
+
+def quoted(text: str) -> str:
+    """Return text as the value of an XML attribute, quotes included."""
+    from xml.sax.saxutils import quoteattr  # loads what talks to the web, for which reading a file need not wait
+
+    return quoteattr(text)
 
 
 def _sidecar(chain: ClosedChain, tree: TreeEntry) -> Sidecar:
@@ -109,7 +115,7 @@ def _origin(M: Array, indent: str) -> list[str]:
 
 
 def _link(link: LinkEntry, folder: Path) -> list[str]:
-    name = quoteattr(link.name)
+    name = quoted(link.name)
     if link.inertia is None and not link.visuals:
         return [f"  <link name={name}/>"]
     lines = [f"  <link name={name}>"]
@@ -149,7 +155,7 @@ def _visual(visual: Visual, folder: Path) -> list[str]:
         "box": lambda: f'<box size="{numbers(size)}"/>',
         "cylinder": lambda: f'<cylinder radius="{numbers(size[:1])}" length="{numbers(size[1:])}"/>',
         "sphere": lambda: f'<sphere radius="{numbers(size)}"/>',
-        "mesh": lambda: f'<mesh filename={quoteattr(mesh_name(visual.mesh, folder))} scale="{numbers(size)}"/>',
+        "mesh": lambda: f'<mesh filename={quoted(mesh_name(visual.mesh, folder))} scale="{numbers(size)}"/>',
     }[visual.shape]()
     return [
         "    <visual>",
@@ -174,10 +180,10 @@ def mesh_name(mesh: str, folder: Path) -> str:
 def _joint(joint: JointEntry, model: pin.Model) -> list[str]:
     kind = _STAND_IN.get(joint.kind, joint.kind)
     lines = [
-        f'  <joint name={quoteattr(joint.name)} type="{kind}">',
+        f'  <joint name={quoted(joint.name)} type="{kind}">',
         *_origin(joint.placement, "    "),
-        f"    <parent link={quoteattr(joint.parent)}/>",
-        f"    <child link={quoteattr(joint.child)}/>",
+        f"    <parent link={quoted(joint.parent)}/>",
+        f"    <child link={quoted(joint.child)}/>",
     ]
     if kind not in ("fixed", "floating"):
         lines.append(f'    <axis xyz="{numbers(joint.axis)}"/>')

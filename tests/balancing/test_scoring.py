@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import mechanisms
 import numpy as np
 import pytest
@@ -117,7 +122,7 @@ def test_what_stands_still_scores_zero() -> None:
     assert not found["rms_torque"].any() and not found["peak_shaking_force"].any()
 
 
-@pytest.mark.parametrize("count", [1, 297, 298, 9000])
+@pytest.mark.parametrize("count", [1, 63, 64, 65, 297, 298, 2049, 9000])
 def test_scores_do_not_depend_on_how_the_designs_are_cut_into_pieces(count: int) -> None:
     chain, paths = five_bar()
     X = np.repeat(designs(chain, 3), -(-count // 3), axis=0)[:count]
@@ -151,6 +156,98 @@ def test_a_body_is_physical_by_its_mass_and_all_its_second_moments(
         bad[2] = [mass, *np.roll([moment, 0.0, 0.0], turn), y + z, 0.0, x + z, 0.0, 0.0, x + y]
         with pytest.raises(InvalidInputError, match="design 0, body psi"):
             score(chain, paths[0], bad, terms="added_mass")
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+@pytest.mark.parametrize(
+    ("arm", "second", "bound"),
+    [
+        (1.0, (-1.0, 0.0, 0.0), 2.0),  # the trace, -t, of the size 2 m arm^2 = 2
+        (0.0, (1.0, -1.0, 0.0), 1.0),  # the minors, -t, of the size 1 squared
+        (0.0, (0.5, 0.5, -1.0), 4.0),  # the determinant, -t / 4, of the size 1 cubed
+    ],
+)
+def test_a_body_is_physical_up_to_a_billionth_of_its_size(
+    arm: float, second: tuple[float, float, float], bound: float, share: float
+) -> None:
+    """A negative second moment -t passes below the bound on its invariant and fails above it.
+
+    So it is whatever the axis, and for a body of three times everything.
+    """
+    chain, paths = five_bar()
+    moments = np.array(second)
+    moments[moments < 0.0] = -1e-9 * bound * share
+    for turn in range(3):
+        x, y, z = np.roll(moments, turn)
+        xx, yy, zz = np.array([y + z, x + z, x + y]) + np.roll([0.0, arm**2, arm**2], turn)
+        border = designs(chain, 1)[0]
+        border[2] = 3.0 * np.array([1.0, *np.roll([arm, 0.0, 0.0], turn), xx, 0.0, yy, 0.0, 0.0, zz])
+        if share < 1.0:
+            assert len(score(chain, paths[0], border, terms="added_mass")) == 1
+        else:
+            with pytest.raises(InvalidInputError, match="design 0, body psi"):
+                score(chain, paths[0], border, terms="added_mass")
+
+
+def test_the_first_body_that_is_not_physical_is_named_among_many() -> None:
+    chain, paths = five_bar()
+    X = np.repeat(designs(chain, 1), 5000, axis=0)
+    X[4321, 2, 0] = X[4321, 3, 0] = X[4322, 0, 0] = -1.0
+    with pytest.raises(InvalidInputError, match=f"design 4321, body {chain.joints[2]}"):
+        score(chain, paths[0], X, terms="added_mass")
+
+
+def test_a_body_whose_invariants_overflow_is_not_physical() -> None:
+    """Infinity less infinity is no number, and is not made one by joining a product and a difference."""
+    chain, paths = five_bar()
+    X = designs(chain, 1)[0]
+    X[2] = [1.0, 0.0, 0.0, 0.0, 2.0, -0.5, 2.0, 0.0, 0.0, 2.0]
+    score(chain, paths[0], X, terms="added_mass")
+    X[2] *= 1e120
+    with pytest.raises(InvalidInputError, match="design 0, body psi"):
+        score(chain, paths[0], X, terms="added_mass")
+
+
+def test_scales_are_those_of_the_largest_numbers_among_all_designs() -> None:
+    chain, paths = five_bar()
+    X = np.repeat(designs(chain, 1), 5000, axis=0)
+    most = X[:1] * np.array([3.0, 2.0, 1.0, 1.0])[:, None]
+    X[17, 0], X[4321, 1] = most[0, 0], most[0, 1]
+    X[4321, 1, 1:4] *= -1.0
+    terms = ("added_mass", "rms_torque")
+    assert score(chain, paths[0], X, terms=terms).scales == score(chain, paths[0], most, terms=terms).scales
+
+
+def test_scores_do_not_depend_on_how_the_designs_lie_in_memory() -> None:
+    chain, paths = five_bar()
+    X = designs(chain, 6)
+    expected = score(chain, paths[0], X)["rms_torque"]
+    sealed = X.copy()
+    sealed.flags.writeable = False
+    for same in (np.asfortranarray(X), np.repeat(X, 2, axis=0)[::2], sealed, X.tolist()):
+        np.testing.assert_array_equal(score(chain, paths[0], same)["rms_torque"], expected)
+    assert len(score(chain, paths[0], np.zeros((0, 4, 10)))) == 0
+
+
+def test_scores_are_the_same_uncompiled() -> None:
+    """Every number but for round-off, and the same body refused."""
+    code = (
+        "import numpy as np, test_scoring as t\n"
+        "chain, paths = t.five_bar()\n"
+        "X = t.designs(chain, 3)\n"
+        "print(*t.score(chain, paths[0], X)['rms_torque'].tolist())\n"
+        "X[2, 1, 9] = 1e-9\n"
+        "try:\n    t.score(chain, paths[0], X)\nexcept t.InvalidInputError as error:\n    print(error)\n"
+    )
+    here = Path(__file__).parent
+    path = os.pathsep.join([str(here), str(here.parent), str(here.parent.parent)])
+    environment = {**os.environ, "PYTHONPATH": path, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    numbers, refused = done.stdout.split("\n", 1)
+    chain, paths = five_bar()
+    expected = score(chain, paths[0], designs(chain, 3))["rms_torque"]
+    np.testing.assert_allclose([float(x) for x in numbers.split()], expected, rtol=1e-13)
+    assert "design 2, body phi_gamma" in refused
 
 
 def test_the_mass_gained_is_small_against_the_masses_it_is_the_difference_of() -> None:

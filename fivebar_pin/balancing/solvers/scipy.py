@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
+import scipy  # its linear algebra is loaded where it is first used
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.balancing.solvers.answer import Answer, nothing
@@ -85,9 +85,9 @@ class _Stage:
     def step(self, w: Array, tau: float) -> tuple[Array, float]:
         """Return the Newton step (n,) and the squared decrement."""
         R = np.concatenate([self.rows(w), np.sqrt(tau) * _root(self.P)])
-        T = linalg.qr(R, mode="r", check_finite=False)[0][: w.size]
-        half = linalg.solve_triangular(T, -self.slope(w, tau), trans=1, check_finite=False)
-        return np.asarray(linalg.solve_triangular(T, half, check_finite=False)), float(half @ half)
+        T = scipy.linalg.qr(R, mode="r", check_finite=False)[0][: w.size]
+        half = scipy.linalg.solve_triangular(T, -self.slope(w, tau), trans=1, check_finite=False)
+        return np.asarray(scipy.linalg.solve_triangular(T, half, check_finite=False)), float(half @ half)
 
     def dual(self, w: Array, dw: Array, tau: float) -> Array:
         """Return z (rows,) of the step dw at w.
@@ -98,10 +98,10 @@ class _Stage:
         R = self.rows(w)
         v = np.concatenate([part.v.ravel() for part in self.parts])
         z = self.back(w, v - R @ dw) / tau
-        Q, T = linalg.qr(R, mode="economic", check_finite=False)
+        Q, T = scipy.linalg.qr(R, mode="economic", check_finite=False)
         for _ in range(_REFINED):
             r = self.P @ (w + dw) + self.q - self.G.T @ z
-            z += self.back(w, Q @ linalg.solve_triangular(T, r, trans=1, check_finite=False))
+            z += self.back(w, Q @ scipy.linalg.solve_triangular(T, r, trans=1, check_finite=False))
         return z
 
 
@@ -111,7 +111,7 @@ def answers(problem: ConicProblem, tolerance: float) -> Iterator[Answer]:
     for factor in _FACTORS:
         try:
             yield _answer(problem, tolerance, factor)
-        except linalg.LinAlgError:
+        except scipy.linalg.LinAlgError:
             yield nothing(problem, "a factorisation failed")
 
 
@@ -133,14 +133,14 @@ def _answer(problem: ConicProblem, tolerance: float, factor: float) -> Answer:
     start, give, z = _start(parts, G, g, factor)
     if start is None:
         z = z[:count]
-        z[equal] = linalg.lstsq(A.T, -program.G.T @ z)[0] if equal.size else z[equal]
+        z[equal] = scipy.linalg.lstsq(A.T, -program.G.T @ z)[0] if equal.size else z[equal]
         return Answer("infeasible", x0, z, "no point inside the cones")
     stage = _Stage(parts, G, g + give, N.T * problem.P @ N, N.T @ (problem.q + problem.P * x0))
     w, z = _followed(stage, start, _GAP * tolerance, factor)
     x = x0 + N @ w
     z = z[:count]
     rest = problem.P * x + problem.q - program.G.T @ z
-    z[equal] = linalg.lstsq(A.T, rest)[0] if equal.size else z[equal]
+    z[equal] = scipy.linalg.lstsq(A.T, rest)[0] if equal.size else z[equal]
     return Answer("solved", x, z, "path followed to its end")
 
 
@@ -149,7 +149,7 @@ def _solved(A: Array, a: Array) -> tuple[Array, Array, Array]:
     n = A.shape[1]
     if not len(A):
         return np.zeros(n), np.eye(n), np.zeros(0)
-    U, s, Vt = linalg.svd(A)
+    U, s, Vt = scipy.linalg.svd(A)
     rank = int((s > _RANK * s[0]).sum()) if s.size else 0
     x0 = -Vt[:rank].T @ ((U[:, :rank].T @ a) / s[:rank])
     return x0, Vt[rank:].T, A @ x0 + a
@@ -223,5 +223,5 @@ def _root(P: Array) -> Array:
     """Return a factor R of P = R^T R; nothing of zero."""
     if not P.any():
         return np.zeros((0, len(P)))
-    values, vectors = linalg.eigh(P)
+    values, vectors = scipy.linalg.eigh(P)
     return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T)
