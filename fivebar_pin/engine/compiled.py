@@ -1,7 +1,7 @@
 """How functions of the engine are compiled.
 
-Only what Numba documents is used. `fastmath=True` would assume that there is no nan and no infinity; the four flags
-here keep both and may only join, reorder signs of zero and invert.
+Only what Numba documents is used. `fastmath=True` would assume that there is no nan and no infinity; the three flags
+here keep both: they may only join operations, pass over signs of zero and multiply by inverses.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "nsz", "arcp"}}
 _HERE = Path(__file__).resolve().parent
+_CONFIG: Any = numba.config  # what the environment says, NUMBA_CACHE_DIR among it
 
 
 def compiled(function: F) -> F:
@@ -50,7 +51,7 @@ def _cache(home_of_function: Path) -> Path | None:
     for path in sorted({*_HERE.glob("*.py"), *home_of_function.glob("*.py")}):
         sources.update(path.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    asked = numba.config.CACHE_DIR
+    asked = _CONFIG.CACHE_DIR
     for folder in [Path(asked)] if asked else [_HERE / "__pycache__", home / "fivebar_pin"]:
         place = folder / f"engine-{sources.hexdigest()[:12]}"
         try:
@@ -65,9 +66,9 @@ def _cache(home_of_function: Path) -> Path | None:
 @contextmanager
 def _caching_in(place: Path) -> Iterator[None]:
     """Let Numba keep machine code in a folder."""
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(place)
+    before = _CONFIG.CACHE_DIR
+    _CONFIG.CACHE_DIR = str(place)
     try:
         yield
     finally:
-        numba.config.CACHE_DIR = before
+        _CONFIG.CACHE_DIR = before

@@ -89,7 +89,7 @@ def _between(I: Integers, W: Array, s: int, coil: int) -> bool:
     d = sub(add(vector_at(W, I[s + POSE_B] + ORIGIN), arm2), add(vector_at(W, I[s + POSE_A] + ORIGIN), arm1))
     size, rest, damper = length_of(d), W[coil + REST], W[coil + DAMPER]
     free = rest == 0.0 and damper == 0.0  # then the force is k d, without a direction to define
-    defined = free or size >= W[coil + TOGETHER]
+    defined: bool = free or size >= W[coil + TOGETHER]
     if free:
         force = scaled(W[coil + STIFFNESS], d)
     else:

@@ -81,7 +81,7 @@ def split(pattern: npt.NDArray[np.bool_]) -> list[tuple[Index, Index]]:
     if np.any(match < 0):
         return [(np.arange(n), np.arange(n))]
     needs = pattern[:, match]  # row i needs the column that row k is matched with
-    _, label = connected_components(csr_array(needs), connection="strong")
+    _, label = connected_components(csr_array(needs.astype(np.float64)), connection="strong")
     before: dict[int, set[int]] = {int(k): set() for k in np.unique(label)}
     for i, k in zip(*np.nonzero(needs), strict=True):
         if label[i] != label[k]:
@@ -355,7 +355,7 @@ class _Layout:
 
     def _closures(self, constants: dict[str, list[int]], memory: dict[str, list[int]]) -> list[int]:
         """Write the records of closures, their entries and rows; return those of the rows."""
-        parts, ratios, found = self.parts, iter(constants["ratio"]), []
+        parts, ratios, found = self.parts, iter(constants["ratio"]), list[int]()
         at = self._begin(e.CLOSURES, e.CLOSURE_SIZE, len(parts.anchored))
         entries = [self._entries(c, ratios, r) for c, r in zip(parts.anchored, self._first_rows(), strict=True)]
         first = self._begin(e.ROWS, e.ROW_SIZE, len(constants["direction"]))
@@ -391,7 +391,7 @@ class _Layout:
     def _first_rows(self) -> list[int]:
         """Return the number of the first row of every closure."""
         counts = [len(self._directions(c, rows)) for c, rows in self._with_rows()]
-        return np.cumsum([0, *counts])[:-1].tolist()
+        return [sum(counts[:k]) for k in range(len(counts))]
 
     def _entries(self, anchored: Anchored, ratios: Iterator[int], row: int) -> int:
         """Write which columns move a closure."""
