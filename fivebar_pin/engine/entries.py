@@ -34,17 +34,17 @@ from fivebar_pin.engine.tables import (
 )  # fmt: skip
 from fivebar_pin.engine.tree import accelerate, move, place
 
-__all__ = ["drive", "loads"]
+__all__ = ["drive", "loads", "reach"]
 
 
 @entry
 def drive(
     I: Integers, W: Array, x_a: Array, v_a: Array, a_a: Array, q: Array, v: Array, a: Array, N: Array, gap: Array
-) -> tuple[int, int]:
+) -> int:
     """Follow the branch of q[0] along a motion (n, na) and write q, v, a, N and the closure residual of each sample.
 
     Returns:
-        How it ended, see `following`, and the number of samples that were followed.
+        Number of samples that were followed; `STATUS` tells how it ended.
     """
     read(W, I[Q_HERE], q, 0, I[NQ])
     W[I[STATUS]] = FOLLOWED
@@ -67,7 +67,26 @@ def drive(
                     k += 1
             gap[done] = open_by(I, W)
             done += 1
-    return int(W[I[STATUS]]), done
+    return done
+
+
+@entry
+def reach(I: Integers, W: Array, x_a: Array, q: Array) -> int:
+    """Follow the branch of q[0] along straight lines of the motors (n, na) and write q (n, nq) at their ends.
+
+    Returns:
+        Number of ends that were reached; `STATUS` tells how it ended.
+    """
+    read(W, I[Q_HERE], q, 0, I[NQ])
+    W[I[STATUS]] = FOLLOWED
+    done = 0
+    while W[I[STATUS]] == FOLLOWED and done < x_a.shape[0]:
+        read(W, I[TO], x_a, done, I[NA])
+        advance(I, W, done == 0)
+        if W[I[STATUS]] == FOLLOWED:
+            write(W, I[Q_HERE], q, done, I[NQ])
+            done += 1
+    return done
 
 
 @entry

@@ -10,10 +10,11 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
-from fivebar_pin.kinematics.branch import follow, node_at
+from fivebar_pin.kinematics.follow import reach
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
+from fivebar_pin.mechanism.prepared import prepared_of
 from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual"]
@@ -61,10 +62,10 @@ def assemble(
         return np.stack(each) if each else np.zeros((0, chain.nq))
     x = checked("q_actuated", x, (chain.na,))
     if near is not None:
-        return _assemble_near(loops, x, checked("near", near, (chain.nq,)), tolerance)
+        return _assemble_near(chain, x, checked("near", near, (chain.nq,)), tolerance)
     for reference in chain.references.values():
         with contextlib.suppress(AssemblyError, SingularityError):
-            return _assemble_near(loops, x, reference, tolerance)
+            return _assemble_near(chain, x, reference, tolerance)
     q, residual = closed_from_starts(chain, loops, x, starts, seed, tolerance)
     if not q.shape[0]:
         raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")
@@ -94,18 +95,18 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
     return loops
 
 
-def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Array:
+def _assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
+    loops = loops_of(chain)
     q = np.array(near[None])
     here = Configurations(loops, q)
     if loops.m and closed_enough(loops, here.gap, _FOLLOWED)[0] and not loops.opposed(here.pairs)[0]:
-        at = _actuated_at(loops, q, x)
-        node = node_at(loops, q[0], at)
-        if node.sigma >= SINGULAR:
-            closed = polish(loops, follow(loops, node, x).q[None])
-            if not closed_enough(loops, closed.residual, tolerance)[0]:
-                raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
-            loops.set_actuated(closed.q, x)
-            return np.asarray(closed.q[0])
+        q, at = _turned(chain, loops, q, x)
+        if here.passive.sigma[0] >= SINGULAR:
+            reached = reach(loops, prepared_of(chain), q[0], np.stack([at, x]))[1:]
+            residual = residual_of(loops, reached)[0]
+            if not closed_enough(loops, np.abs(residual).max(initial=0.0), tolerance):
+                raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()}")
+            return np.asarray(reached[0])
         if np.array_equal(at, x) and closed_enough(loops, here.gap, tolerance)[0]:
             return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
     loops.set_actuated(q, x)
@@ -136,11 +137,22 @@ def _nudged(loops: Loops, q: Array, x: Array) -> Array:
     return starts
 
 
-def _actuated_at(loops: Loops, q: Array, x: Array) -> Array:
-    """Return the actuated coordinates (na,) of q (1, nq); unbounded joints count from the turn nearest to x."""
-    at = loops.actuated_of(q)[0]
-    turn = 2.0 * np.pi * np.array([loops.tree.is_cyclic(int(k)) for k in loops.actuated], dtype=np.float64)
-    return np.asarray(at + turn * np.round((x - at) / (2.0 * np.pi)))
+def _turned(chain: ClosedChain, loops: Loops, q: Array, x: Array) -> tuple[Array, Array]:
+    """Return q (1, nq) with whole turns added that lead towards x (na,), and its actuated coordinates (na,).
+
+    A turn of a joint that no closure counts leads to the same pose. A joint whose coordinates are a cosine and a sine
+    is in the turn nearest to x; others keep the sense in which they turn.
+    """
+    at, counted = loops.actuated_of(q)[0], _counted(chain)
+    for a, k in enumerate(loops.actuated):
+        turns = (x[a] - at[a]) / (2.0 * np.pi)
+        if loops.tree.is_cyclic(int(k)):
+            at[a] += 2.0 * np.pi * np.round(turns)
+        elif loops.tree.is_angle(int(k)) and int(k) not in counted:
+            at[a] += 2.0 * np.pi * np.trunc(turns)
+    turned = np.array(q)
+    loops.set_actuated(turned, at)
+    return turned, at
 
 
 def closed_from_starts(

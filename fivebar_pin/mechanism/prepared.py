@@ -11,7 +11,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
-from fivebar_pin.engine.tables import Integers
+from fivebar_pin.engine.tables import NQ, Integers
 from fivebar_pin.mechanism.layout import Index, Parts, blocks_of, joined_rows, layout_of
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.loops import Loops, loops_of
@@ -27,10 +27,11 @@ class Prepared:
     Attributes:
         I: records of the chain, never written.
         W: its constants, and working memory as it is before the first sample; never written.
+        nq: length of a configuration.
     """
 
     def __init__(self, I: Integers, W: Array) -> None:
-        self.I, self.W = I, W
+        self.I, self.W, self.nq = I, W, int(I[NQ])
         for vector in (I, W):
             seal(vector)
         self._threads = threading.local()
