@@ -1,0 +1,209 @@
+"""Random smooth drives that keep clear of singularities, and whether a library that promises to follow them does.
+
+    python tests/drives.py 2000 [seed]          # prints false alarms and silent flips of every shipped mechanism
+
+A drive is judged by its own straight lines: the actuated coordinates are refined between the samples by linear
+interpolation, and the refined motion has to go through, its passive Jacobian clearly regular at every one of some
+10 000 points and no point further from the last than the complements of both say. The coarse motion then has to go
+through as well (anything else is a false alarm) and to arrive at the same configurations (anything else is a flip).
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+
+import fivebar_pin as fb
+from fivebar_pin._arrays import Array
+from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.loops import Loops, loops_of
+
+CLEAR = 0.02
+"""Smallest scaled singular value of the passive columns on a way that is clear of singularities [-]."""
+REFINED = 10_000
+"""Points of the reference, at least."""
+SAME = 1e-9
+"""Difference of two configurations that are one [rad, or chain lengths]."""
+_STRAYED = 0.3
+"""Distance from what the complements predict, as part of the singular value: another mode is about twice that away."""
+_FEWEST, _MOST = 20, 400
+"""Samples of a drive."""
+_SMALLEST, _LARGEST = 0.05, 3.0
+"""Sum of the amplitudes of one motor's harmonics [rad, or chain lengths]."""
+_HARMONICS = 4
+"""Harmonics of one motor, at most."""
+_TURNING = 0.25
+"""Share of the drives that also turn their motors round."""
+_LEAD = 200
+"""Points on the straight line from the named configuration to the first sample."""
+_BLOCK = 2048
+"""Configurations worked on at a time."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A motion that can be driven, and where it leads.
+
+    Attributes:
+        motion: of the actuated coordinates.
+        q: configurations at the samples (n, nq), from the refined motion.
+        clearance: smallest scaled singular value on the way [-].
+    """
+
+    motion: fb.Motion
+    q: Array
+    clearance: float
+
+
+@dataclass
+class Tally:
+    """What became of drives that can be driven.
+
+    Attributes:
+        drives: how many there were.
+        alarms: errors that were raised though the way is clear: number of the drive and the error.
+        flips: numbers of the drives that silently ended up on another way.
+    """
+
+    drives: int = 0
+    alarms: list[tuple[int, fb.FiveBarPinError]] = field(default_factory=list)
+    flips: list[int] = field(default_factory=list)
+
+
+def random_drives(
+    chain: fb.ClosedChain, rng: np.random.Generator, *, clear: float = CLEAR, refused: Counter[str] | None = None
+) -> Iterator[Drive]:
+    """Yield drives of a chain without end; its motions start on the assembly mode of its first named configuration.
+
+    Args:
+        chain: the mechanism.
+        rng: source of the motions.
+        clear: smallest singular value allowed on the way [-].
+        refused: where to count why motions were not kept.
+    """
+    home = next(iter(chain.references.values()))
+    while True:
+        found = _reference(chain, home, _random_motion(chain, home, rng), clear)
+        if isinstance(found, Drive):
+            yield found
+        elif refused is not None:
+            refused[found] += 1
+
+
+def judge(chain: fb.ClosedChain, drives: Sequence[Drive]) -> Tally:
+    """Drive the coarse motions and compare where they lead with the references."""
+    tally = Tally(len(drives))
+    for k, drive in enumerate(drives):
+        try:
+            q = fb.drive(chain, drive.motion, near=drive.q[0], limits="ignore").q
+        except fb.FiveBarPinError as error:
+            tally.alarms.append((k, error))
+            continue
+        if _apart(loops_of(chain), q, drive.q) > SAME:
+            tally.flips.append(k)
+    return tally
+
+
+def _random_motion(chain: fb.ClosedChain, home: Array, rng: np.random.Generator) -> fb.Motion:
+    """Return harmonics of random amplitude and phase about the named configuration, a second long."""
+    loops = loops_of(chain)
+    t = np.linspace(0.0, 1.0, round(np.exp(rng.uniform(np.log(_FEWEST), np.log(_MOST)))))
+    q, v, a = (np.zeros((t.size, chain.na)) for _ in range(3))
+    q += loops.actuated_of(home[None])
+    whole = np.exp(rng.uniform(np.log(_SMALLEST), np.log(_LARGEST)))
+    turning = rng.random() < _TURNING
+    for k in range(chain.na):
+        scale = whole * rng.uniform(0.3, 1.0) * loops.column_scale[chain.actuated_index[k]]
+        share = rng.dirichlet(np.ones(rng.integers(1, _HARMONICS + 1)))
+        for h, part in enumerate(scale * share, start=1):
+            w, x = 2.0 * np.pi * h, 2.0 * np.pi * (h * t + rng.random())
+            q[:, k] += part * np.sin(x)
+            v[:, k] += part * w * np.cos(x)
+            a[:, k] -= part * w**2 * np.sin(x)
+        if turning and loops.tree.is_angle(int(chain.actuated_index[k])):
+            turns = 2.0 * np.pi * rng.integers(-2, 3)
+            q[:, k] += turns * t
+            v[:, k] += turns
+    return fb.Motion(t, q, v, a)
+
+
+def _reference(chain: fb.ClosedChain, home: Array, motion: fb.Motion, clear: float) -> Drive | str:
+    """Follow a motion in small steps; return why not where it cannot be."""
+    loops, n = loops_of(chain), len(motion)
+    fine = -(-REFINED // (n - 1))
+    lead = np.linspace(loops.actuated_of(home[None])[0], motion.q[0], _LEAD, endpoint=False)
+    X = np.concatenate([lead, _refined(motion.q, fine)])
+    still = np.zeros_like(X)
+    try:
+        path = fb.drive(chain, fb.Motion(np.arange(len(X), dtype=float), X, still, still), near=home, limits="ignore")
+    except fb.FiveBarPinError as error:
+        return type(error).__name__
+    sigma = _sigma(loops, path.q[_LEAD:])
+    if sigma.min() < clear:
+        return "too near to a singularity"
+    if not _is_one_way(loops, path.q[_LEAD:], path.N[_LEAD:], X[_LEAD:], sigma):
+        return "too coarse to be sure"
+    return Drive(motion, path.q[_LEAD::fine], float(sigma.min()))
+
+
+def _refined(x: Array, fine: int) -> Array:
+    """Return samples (n, na) with fine - 1 points on the straight line between any two ((n - 1) fine + 1, na)."""
+    at = np.arange((len(x) - 1) * fine + 1) / fine
+    columns = np.column_stack([np.interp(at, np.arange(len(x)), x[:, k]) for k in range(x.shape[1])])
+    columns[::fine] = x
+    return columns
+
+
+def _sigma(loops: Loops, q: Array) -> Array:
+    """Return the smallest scaled singular value of the passive columns (n,)."""
+    blocks = [Configurations(loops, q[k : k + _BLOCK]).passive.sigma for k in range(0, len(q), _BLOCK)]
+    return np.concatenate(blocks)
+
+
+def _is_one_way(loops: Loops, q: Array, N: Array, X: Array, sigma: Array) -> bool:
+    """Tell whether every step is the one that the complements of its ends predict, nearer than any other mode."""
+    step = loops.tree.difference(q[:-1], q[1:])
+    predicted = np.einsum("nva,na->nv", 0.5 * (N[:-1] + N[1:]), np.diff(X, axis=0))
+    strayed = np.abs((step - predicted) / loops.column_scale).max(axis=1)
+    return bool(np.all(strayed < _STRAYED * np.minimum(sigma[:-1], sigma[1:])))
+
+
+def _apart(loops: Loops, q0: Array, q1: Array) -> float:
+    """Return the largest difference of two ways (n, nq), whole turns of angles left out [rad, or chain lengths]."""
+    d = loops.tree.difference(q0, q1) / loops.column_scale
+    angles = np.array([loops.tree.is_angle(k) for k in range(loops.tree.nv)])
+    d[:, angles] -= 2.0 * np.pi * np.round(d[:, angles] / (2.0 * np.pi))
+    return float(np.abs(d).max(initial=0.0))
+
+
+def main(count: int, seed: int = 0) -> None:
+    """Drive some mechanisms at random and say what went wrong."""
+    say, names = sys.stdout.write, fb.io.shipped()
+    each, total = -(-count // len(names)), Tally()
+    for k, name in enumerate(names):
+        chain, refused = fb.load(fb.io.shipped_path(name)), Counter[str]()
+        start = time.perf_counter()
+        drives = list(islice(random_drives(chain, np.random.default_rng([seed, k]), refused=refused), each))
+        made = time.perf_counter()
+        tally = judge(chain, drives)
+        judged = time.perf_counter()
+        say(f"{name}: {each} drives, {len(tally.alarms)} false alarms, {len(tally.flips)} flips; ")
+        say(f"made in {made - start:.1f} s, judged in {judged - made:.1f} s; not kept: {dict(refused)}\n")
+        for j, error in tally.alarms:
+            say(f"    drive {j}, {len(drives[j].q)} samples, clearance {drives[j].clearance:.3f}: {error}\n")
+        for j in tally.flips:
+            say(f"    drive {j}, {len(drives[j].q)} samples, clearance {drives[j].clearance:.3f}: flipped\n")
+        total.drives += tally.drives
+        total.alarms += tally.alarms
+        total.flips += tally.flips
+    say(f"{total.drives} drives, {len(total.alarms)} false alarms, {len(total.flips)} flips\n")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
