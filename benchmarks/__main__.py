@@ -7,9 +7,9 @@ import argparse
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import ladder, mechanisms, roads, scoring
+from benchmarks import foreign, ladder, mechanisms, roads, scoring
 
-PARTS = ("roads", "mechanisms", "ladder", "assemblies", "scoring")
+PARTS = ("roads", "foreign", "mechanisms", "ladder", "assemblies", "scoring")
 
 
 def main() -> None:
@@ -23,6 +23,10 @@ def main() -> None:
     if "roads" in chosen.which:
         rows = roads.rows(tuple(chosen.samples))
         _show(console, "Five-bar, torque and shaking wrench, per sample", roads.HEADINGS, rows)
+    if "foreign" in chosen.which:
+        rows, missing = foreign.rows()
+        _show(console, "Five-bar in other engines, torque of both motors, per sample", foreign.HEADINGS, rows)
+        console.print(*missing, sep="\n")
     if "mechanisms" in chosen.which:
         _show(console, "Shipped mechanisms, torque and shaking wrench", mechanisms.HEADINGS, mechanisms.rows())
     if "ladder" in chosen.which:
