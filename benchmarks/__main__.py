@@ -7,9 +7,9 @@ import argparse
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import foreign, ladder, mechanisms, roads, scoring
+from benchmarks import foreign, ladder, mechanisms, roads, robot, scoring
 
-PARTS = ("roads", "foreign", "mechanisms", "ladder", "assemblies", "scoring")
+PARTS = ("roads", "foreign", "mechanisms", "robot", "ladder", "assemblies", "scoring")
 
 
 def main() -> None:
@@ -29,6 +29,8 @@ def main() -> None:
         console.print(*missing, sep="\n")
     if "mechanisms" in chosen.which:
         _show(console, "Shipped mechanisms, torque and shaking wrench", mechanisms.HEADINGS, mechanisms.rows())
+    if "robot" in chosen.which:
+        _show(console, "Four legs, 40 joints, 24 motors, 8 loops", robot.HEADINGS, robot.rows())
     if "ladder" in chosen.which:
         rows, side, stacked = ladder.rows()
         _show(console, "N five-bars, torque and shaking wrench, per sample", ladder.HEADINGS, rows)
