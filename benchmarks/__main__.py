@@ -32,9 +32,10 @@ def main() -> None:
     if "robot" in chosen.which:
         _show(console, "Four legs, 40 joints, 24 motors, 8 loops", robot.HEADINGS, robot.rows())
     if "ladder" in chosen.which:
-        rows, side, stacked = ladder.rows()
-        _show(console, "N five-bars, torque and shaking wrench, per sample", ladder.HEADINGS, rows)
-        console.print(f"cost per sample grows as N^{side:.2f} side by side, N^{stacked:.2f} stacked")
+        rows, powers = ladder.rows()
+        _show(console, "N four-bars, torque and shaking wrench, per sample", ladder.HEADINGS, rows)
+        own, own_hand, one, one_hand = (f"N^{power:.2f}" for power in powers)
+        console.print(f"cost grows as {own} with own cranks (by hand {own_hand}), as {one} with one ({one_hand})")
     if "assemblies" in chosen.which:
         rows = mechanisms.assemblies(chosen.assemblies)
         _show(console, "Random assemblies", mechanisms.ASSEMBLIES, rows)
