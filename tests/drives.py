@@ -1,6 +1,7 @@
 """Random smooth drives that keep clear of singularities, and whether a library that promises to follow them does.
 
     python tests/drives.py 2000 [seed]          # prints false alarms and silent flips of every shipped mechanism
+    python tests/drives.py 500 [seed] tight     # the same with drives that only just keep clear
 
 A drive is judged by its own straight lines: the actuated coordinates are refined between the samples by linear
 interpolation, and the refined motion has to go through, its passive Jacobian clearly regular at every one of some
@@ -40,6 +41,10 @@ _HARMONICS = 4
 """Harmonics of one motor, at most."""
 _TURNING = 0.25
 """Share of the drives that also turn their motors round."""
+_WIDER, _WIDENED, _HALVED = 1.6, 5, 4
+"""A drive that is to be tight: how much wider it is tried next, how often, and how often halfway back."""
+_IN_VAIN = 100
+"""Motions not kept in a row after which there is thought to be none to keep."""
 _LEAD = 200
 """Points on the straight line from the named configuration to the first sample."""
 _BLOCK = 2048
@@ -77,7 +82,12 @@ class Tally:
 
 
 def random_drives(
-    chain: fb.ClosedChain, rng: np.random.Generator, *, clear: float = CLEAR, refused: Counter[str] | None = None
+    chain: fb.ClosedChain,
+    rng: np.random.Generator,
+    *,
+    clear: float = CLEAR,
+    tight: bool = False,
+    refused: Counter[str] | None = None,
 ) -> Iterator[Drive]:
     """Yield drives of a chain without end; its motions start on the assembly mode of its first named configuration.
 
@@ -85,15 +95,43 @@ def random_drives(
         chain: the mechanism.
         rng: source of the motions.
         clear: smallest singular value allowed on the way [-].
+        tight: whether each motion is made as wide as it may be.
         refused: where to count why motions were not kept.
     """
-    home = next(iter(chain.references.values()))
-    while True:
+    home, in_vain = next(iter(chain.references.values())), 0
+    while in_vain < _IN_VAIN:
         found = _reference(chain, home, _random_motion(chain, home, rng), clear)
         if isinstance(found, Drive):
-            yield found
-        elif refused is not None:
-            refused[found] += 1
+            in_vain = 0
+            yield _widened(chain, home, found, clear) if tight else found
+        else:
+            in_vain += 1
+            if refused is not None:
+                refused[found] += 1
+    raise RuntimeError(f"{chain.name}: none of {_IN_VAIN} motions keeps {clear:g} away from singularities")
+
+
+def _widened(chain: fb.ClosedChain, home: Array, drive: Drive, clear: float) -> Drive:
+    """Return the same motion about the named configuration, as wide as it is clear, at most ten times as wide."""
+    centre = loops_of(chain).actuated_of(home[None])
+    base, width, step = drive.motion, 1.0, _WIDER
+    for _ in range(_WIDENED):
+        found = _reference(chain, home, _scaled(base, centre, width * step), clear)
+        if not isinstance(found, Drive):
+            break
+        drive, width = found, width * step
+    else:
+        return drive
+    for _ in range(_HALVED):
+        step = np.sqrt(step)
+        found = _reference(chain, home, _scaled(base, centre, width * step), clear)
+        if isinstance(found, Drive):
+            drive, width = found, width * step
+    return drive
+
+
+def _scaled(motion: fb.Motion, centre: Array, width: float) -> fb.Motion:
+    return fb.Motion(motion.t, centre + width * (motion.q - centre), width * motion.v, width * motion.a)
 
 
 def judge(chain: fb.ClosedChain, drives: Sequence[Drive]) -> Tally:
@@ -182,19 +220,22 @@ def _apart(loops: Loops, q0: Array, q1: Array) -> float:
     return float(np.abs(d).max(initial=0.0))
 
 
-def main(count: int, seed: int = 0) -> None:
-    """Drive some mechanisms at random and say what went wrong."""
+def main(count: str, seed: str = "0", kind: str = "") -> None:
+    """Drive the shipped mechanisms at random and say what went wrong."""
     say, names = sys.stdout.write, fb.io.shipped()
-    each, total = -(-count // len(names)), Tally()
+    each, total = -(-int(count) // len(names)), Tally()
     for k, name in enumerate(names):
         chain, refused = fb.load(fb.io.shipped_path(name)), Counter[str]()
         start = time.perf_counter()
-        drives = list(islice(random_drives(chain, np.random.default_rng([seed, k]), refused=refused), each))
+        rng = np.random.default_rng([int(seed), k])
+        drives = list(islice(random_drives(chain, rng, tight=kind == "tight", refused=refused), each))
         made = time.perf_counter()
         tally = judge(chain, drives)
         judged = time.perf_counter()
         say(f"{name}: {each} drives, {len(tally.alarms)} false alarms, {len(tally.flips)} flips; ")
-        say(f"made in {made - start:.1f} s, judged in {judged - made:.1f} s; not kept: {dict(refused)}\n")
+        say(f"made in {made - start:.1f} s, judged in {judged - made:.1f} s; ")
+        quarters = np.quantile([drive.clearance for drive in drives], [0.0, 0.25, 0.5])
+        say(f"clearance {' '.join(f'{x:.3f}' for x in quarters)}; not kept: {dict(refused)}\n")
         for j, error in tally.alarms:
             say(f"    drive {j}, {len(drives[j].q)} samples, clearance {drives[j].clearance:.3f}: {error}\n")
         for j in tally.flips:
@@ -206,4 +247,4 @@ def main(count: int, seed: int = 0) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*sys.argv[1:])
