@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import foreign, ladder, mechanisms, roads, robot, scoring
+from benchmarks.machine import machine
 
 PARTS = ("roads", "foreign", "mechanisms", "robot", "ladder", "assemblies", "scoring")
 
@@ -20,6 +21,7 @@ def main() -> None:
     parser.add_argument("--designs", type=int, default=1_000_000, help="mass distributions to score [1000000]")
     chosen = parser.parse_args()
     console = Console(width=150)
+    console.print(machine())
     if "roads" in chosen.which:
         rows = roads.rows(tuple(chosen.samples))
         _show(console, "Five-bar, torque and shaking wrench, per sample", roads.HEADINGS, rows)

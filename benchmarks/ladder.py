@@ -21,7 +21,7 @@ from fivebar_pin.shipped import TreeBuilder
 HEADINGS = ("four-bars", "own cranks", "by hand", "ratio", "one crank", "by hand", "ratio", "worst difference")
 SIZES = (1, 2, 4, 8, 16, 32, 64)
 SAMPLES = 500
-CRANK, COUPLER, ROCKER, GROUND = 0.2, 0.45, 0.25, 0.5
+CRANK, COUPLER, ROCKER, GROUND = 0.2, 0.5, 0.25, 0.5
 """Lengths [m]."""
 MIDDLE, SWING = 1.4, 0.35
 """The crank swings by so much about this angle [rad]."""

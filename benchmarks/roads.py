@@ -53,5 +53,5 @@ def rows(samples: tuple[int, ...]) -> list[tuple[str, ...]]:
             for x in (loads.torque, solution.torque)
         )
         micro = [f"{1e6 * t / n:.3g} us" for t in (loop, loop_all, road, road_all, closed)]
-        out.append((f"{n}", *micro, f"{loop / road:.1f} x", f"{loop / closed:.0f} x", f"{difference:.1e}"))
+        out.append((f"{n}", *micro, f"{loop / road:.2g} x", f"{loop / closed:.2g} x", f"{difference:.1e}"))
     return out
