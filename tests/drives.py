@@ -31,6 +31,8 @@ REFINED = 10_000
 """Points of the reference, at least."""
 SAME = 1e-9
 """Difference of two configurations that are one [rad, or chain lengths]."""
+LEAD = 200
+"""Points on the straight line from the named configuration to the first sample."""
 _STRAYED = 0.3
 """Distance from what the complements predict, as part of the singular value: another mode is about twice that away."""
 _FEWEST, _MOST = 20, 400
@@ -45,8 +47,6 @@ _WIDER, _WIDENED, _HALVED = 1.6, 5, 4
 """A drive that is to be tight: how much wider it is tried next, how often, and how often halfway back."""
 _IN_VAIN = 100
 """Motions not kept in a row after which there is thought to be none to keep."""
-_LEAD = 200
-"""Points on the straight line from the named configuration to the first sample."""
 _BLOCK = 2048
 """Configurations worked on at a time."""
 
@@ -100,7 +100,7 @@ def random_drives(
     """
     home, in_vain = next(iter(chain.references.values())), 0
     while in_vain < _IN_VAIN:
-        found = _reference(chain, home, _random_motion(chain, home, rng), clear)
+        found = reference(chain, home, random_motion(chain, home, rng), clear)
         if isinstance(found, Drive):
             in_vain = 0
             yield _widened(chain, home, found, clear) if tight else found
@@ -116,7 +116,7 @@ def _widened(chain: fb.ClosedChain, home: Array, drive: Drive, clear: float) -> 
     centre = loops_of(chain).actuated_of(home[None])
     base, width, step = drive.motion, 1.0, _WIDER
     for _ in range(_WIDENED):
-        found = _reference(chain, home, _scaled(base, centre, width * step), clear)
+        found = reference(chain, home, _scaled(base, centre, width * step), clear)
         if not isinstance(found, Drive):
             break
         drive, width = found, width * step
@@ -124,7 +124,7 @@ def _widened(chain: fb.ClosedChain, home: Array, drive: Drive, clear: float) -> 
         return drive
     for _ in range(_HALVED):
         step = np.sqrt(step)
-        found = _reference(chain, home, _scaled(base, centre, width * step), clear)
+        found = reference(chain, home, _scaled(base, centre, width * step), clear)
         if isinstance(found, Drive):
             drive, width = found, width * step
     return drive
@@ -143,12 +143,12 @@ def judge(chain: fb.ClosedChain, drives: Sequence[Drive]) -> Tally:
         except fb.FiveBarPinError as error:
             tally.alarms.append((k, error))
             continue
-        if _apart(loops_of(chain), q, drive.q) > SAME:
+        if apart(loops_of(chain), q, drive.q) > SAME:
             tally.flips.append(k)
     return tally
 
 
-def _random_motion(chain: fb.ClosedChain, home: Array, rng: np.random.Generator) -> fb.Motion:
+def random_motion(chain: fb.ClosedChain, home: Array, rng: np.random.Generator) -> fb.Motion:
     """Return harmonics of random amplitude and phase about the named configuration, a second long."""
     loops = loops_of(chain)
     t = np.linspace(0.0, 1.0, round(np.exp(rng.uniform(np.log(_FEWEST), np.log(_MOST)))))
@@ -171,23 +171,27 @@ def _random_motion(chain: fb.ClosedChain, home: Array, rng: np.random.Generator)
     return fb.Motion(t, q, v, a)
 
 
-def _reference(chain: fb.ClosedChain, home: Array, motion: fb.Motion, clear: float) -> Drive | str:
+def reference(chain: fb.ClosedChain, home: Array, motion: fb.Motion, clear: float) -> Drive | str:
     """Follow a motion in small steps; return why not where it cannot be."""
-    loops, n = loops_of(chain), len(motion)
-    fine = -(-REFINED // (n - 1))
-    lead = np.linspace(loops.actuated_of(home[None])[0], motion.q[0], _LEAD, endpoint=False)
-    X = np.concatenate([lead, _refined(motion.q, fine)])
+    loops, (X, fine) = loops_of(chain), lines(chain, home, motion)
     still = np.zeros_like(X)
     try:
         path = fb.drive(chain, fb.Motion(np.arange(len(X), dtype=float), X, still, still), near=home, limits="ignore")
     except fb.FiveBarPinError as error:
         return type(error).__name__
-    sigma = _sigma(loops, path.q[_LEAD:])
+    sigma = smallest_singular_value(loops, path.q[LEAD:])
     if sigma.min() < clear:
         return "too near to a singularity"
-    if not _is_one_way(loops, path.q[_LEAD:], path.N[_LEAD:], X[_LEAD:], sigma):
+    if not _is_one_way(loops, path.q[LEAD:], path.N[LEAD:], X[LEAD:], sigma):
         return "too coarse to be sure"
-    return Drive(motion, path.q[_LEAD::fine], float(sigma.min()))
+    return Drive(motion, path.q[LEAD::fine], float(sigma.min()))
+
+
+def lines(chain: fb.ClosedChain, home: Array, motion: fb.Motion) -> tuple[Array, int]:
+    """Return points on the straight lines to the first sample and from there on, and how many a sample takes."""
+    fine = -(-REFINED // (len(motion) - 1))
+    lead = np.linspace(loops_of(chain).actuated_of(home[None])[0], motion.q[0], LEAD, endpoint=False)
+    return np.concatenate([lead, _refined(motion.q, fine)]), fine
 
 
 def _refined(x: Array, fine: int) -> Array:
@@ -198,7 +202,7 @@ def _refined(x: Array, fine: int) -> Array:
     return columns
 
 
-def _sigma(loops: Loops, q: Array) -> Array:
+def smallest_singular_value(loops: Loops, q: Array) -> Array:
     """Return the smallest scaled singular value of the passive columns (n,)."""
     blocks = [Configurations(loops, q[k : k + _BLOCK]).passive.sigma for k in range(0, len(q), _BLOCK)]
     return np.concatenate(blocks)
@@ -212,7 +216,7 @@ def _is_one_way(loops: Loops, q: Array, N: Array, X: Array, sigma: Array) -> boo
     return bool(np.all(strayed < _STRAYED * np.minimum(sigma[:-1], sigma[1:])))
 
 
-def _apart(loops: Loops, q0: Array, q1: Array) -> float:
+def apart(loops: Loops, q0: Array, q1: Array) -> float:
     """Return the largest difference of two ways (n, nq), whole turns of angles left out [rad, or chain lengths]."""
     d = loops.tree.difference(q0, q1) / loops.column_scale
     angles = np.array([loops.tree.is_angle(k) for k in range(loops.tree.nv)])

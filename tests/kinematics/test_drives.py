@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 import fivebar_pin as fb
+from benchmarks.positions import closed_form
 from fivebar_pin.errors import SingularityError
+from fivebar_pin.mechanism.loops import loops_of
 
 EACH = 3
 
@@ -25,6 +27,27 @@ def test_random_drives_that_keep_clear_of_singularities_are_followed(name):
     chain, rng = shipped(name), np.random.default_rng(fb.io.shipped().index(name))
     tally = drives.judge(chain, list(islice(drives.random_drives(chain, rng), EACH)))
     assert (tally.drives, tally.alarms, tally.flips) == (EACH, [], [])
+
+
+@pytest.mark.parametrize("name", [name for name in fb.io.shipped() if name != "planar_3rrr"])
+def test_references_are_the_ways_of_closed_forms_and_are_refused_where_these_end_or_come_near_a_singularity(name):
+    """Closed forms know no steps: they find what both the motion and its reference might get wrong alike."""
+    chain, rng = shipped(name), np.random.default_rng(100 + fb.io.shipped().index(name))
+    home, loops = chain.references["home"], loops_of(chain)
+    position = closed_form(chain, home)
+    for _ in range(EACH):
+        motion = drives.random_motion(chain, home, rng)
+        found = drives.reference(chain, home, motion, drives.CLEAR)
+        X, fine = drives.lines(chain, home, motion)
+        try:
+            q = np.array([position(x) for x in X.tolist()])
+        except ValueError:  # out of reach
+            assert not isinstance(found, drives.Drive)
+            continue
+        if isinstance(found, drives.Drive):
+            assert drives.apart(loops, q[drives.LEAD :: fine], found.q) < drives.SAME
+        else:
+            assert drives.smallest_singular_value(loops, q).min() < drives.CLEAR
 
 
 def test_drives_as_wide_as_they_may_be_come_near_the_bound_and_are_followed():
@@ -85,4 +108,4 @@ def test_a_reference_that_jumps_to_another_mode_is_not_one_way(one, monkeypatch)
         return replace(path, q=np.where(half, other.q, path.q), N=np.where(half[..., None], other.N, path.N))
 
     monkeypatch.setattr(fb, "drive", jumping)
-    assert drives._reference(chain, home, drive.motion, drives.CLEAR) == "too coarse to be sure"
+    assert drives.reference(chain, home, drive.motion, drives.CLEAR) == "too coarse to be sure"
