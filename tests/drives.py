@@ -2,11 +2,13 @@
 
     python tests/drives.py 2000 [seed]          # prints false alarms and silent flips of every shipped mechanism
     python tests/drives.py 500 [seed] tight     # the same with drives that only just keep clear
+    python tests/drives.py 500 [seed] blocked   # motions that leave the reach: which go through all the same
 
 A drive is judged by its own straight lines: the actuated coordinates are refined between the samples by linear
 interpolation, and the refined motion has to go through, its passive Jacobian clearly regular at every one of some
 10 000 points and no point further from the last than the complements of both say. The coarse motion then has to go
 through as well (anything else is a false alarm) and to arrive at the same configurations (anything else is a flip).
+Where the refined motion is blocked, the coarse one has to be refused too.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -47,6 +50,8 @@ _WIDER, _WIDENED, _HALVED = 1.6, 5, 4
 """A drive that is to be tight: how much wider it is tried next, how often, and how often halfway back."""
 _IN_VAIN = 100
 """Motions not kept in a row after which there is thought to be none to keep."""
+_BLOCKED = ("AssemblyError", "BranchError", "SingularityError")
+"""What is said of a motion that cannot be followed."""
 _BLOCK = 2048
 """Configurations worked on at a time."""
 
@@ -148,6 +153,31 @@ def judge(chain: fb.ClosedChain, drives: Sequence[Drive]) -> Tally:
     return tally
 
 
+def blocked_motions(chain: fb.ClosedChain, rng: np.random.Generator) -> Iterator[tuple[fb.Motion, Array]]:
+    """Yield motions whose straight lines leave the reach or meet a singularity, and where they start (nq,)."""
+    home, in_vain = next(iter(chain.references.values())), 0
+    while in_vain < _IN_VAIN:
+        motion = random_motion(chain, home, rng)
+        in_vain += 1
+        if reference(chain, home, motion, 0.0) in _BLOCKED:
+            try:
+                start = _followed(chain, home, lines(chain, home, motion)[0][: LEAD + 1]).q[-1]
+            except fb.FiveBarPinError:  # on the way to the first sample already
+                continue
+            in_vain = 0
+            yield motion, start
+
+
+def passed(chain: fb.ClosedChain, blocked: Sequence[tuple[fb.Motion, Array]]) -> list[int]:
+    """Return which blocked motions go through when their samples alone are given."""
+    through = []
+    for k, (motion, start) in enumerate(blocked):
+        with suppress(fb.FiveBarPinError):
+            fb.drive(chain, motion, near=start, limits="ignore")
+            through.append(k)
+    return through
+
+
 def random_motion(chain: fb.ClosedChain, home: Array, rng: np.random.Generator) -> fb.Motion:
     """Return harmonics of random amplitude and phase about the named configuration, a second long."""
     loops = loops_of(chain)
@@ -174,9 +204,8 @@ def random_motion(chain: fb.ClosedChain, home: Array, rng: np.random.Generator) 
 def reference(chain: fb.ClosedChain, home: Array, motion: fb.Motion, clear: float) -> Drive | str:
     """Follow a motion in small steps; return why not where it cannot be."""
     loops, (X, fine) = loops_of(chain), lines(chain, home, motion)
-    still = np.zeros_like(X)
     try:
-        path = fb.drive(chain, fb.Motion(np.arange(len(X), dtype=float), X, still, still), near=home, limits="ignore")
+        path = _followed(chain, home, X)
     except fb.FiveBarPinError as error:
         return type(error).__name__
     sigma = smallest_singular_value(loops, path.q[LEAD:])
@@ -185,6 +214,12 @@ def reference(chain: fb.ClosedChain, home: Array, motion: fb.Motion, clear: floa
     if not _is_one_way(loops, path.q[LEAD:], path.N[LEAD:], X[LEAD:], sigma):
         return "too coarse to be sure"
     return Drive(motion, path.q[LEAD::fine], float(sigma.min()))
+
+
+def _followed(chain: fb.ClosedChain, home: Array, X: Array) -> fb.Trajectory:
+    """Follow actuated coordinates (n, na), one after the other."""
+    still = np.zeros_like(X)
+    return fb.drive(chain, fb.Motion(np.arange(len(X), dtype=float), X, still, still), near=home, limits="ignore")
 
 
 def lines(chain: fb.ClosedChain, home: Array, motion: fb.Motion) -> tuple[Array, int]:
@@ -226,28 +261,37 @@ def apart(loops: Loops, q0: Array, q1: Array) -> float:
 
 def main(count: str, seed: str = "0", kind: str = "") -> None:
     """Drive the shipped mechanisms at random and say what went wrong."""
-    say, names = sys.stdout.write, fb.io.shipped()
-    each, total = -(-int(count) // len(names)), Tally()
+    names = fb.io.shipped()
+    each, total = -(-int(count) // len(names)), Counter[str]()
     for k, name in enumerate(names):
-        chain, refused = fb.load(fb.io.shipped_path(name)), Counter[str]()
-        start = time.perf_counter()
-        rng = np.random.default_rng([int(seed), k])
-        drives = list(islice(random_drives(chain, rng, tight=kind == "tight", refused=refused), each))
-        made = time.perf_counter()
-        tally = judge(chain, drives)
-        judged = time.perf_counter()
-        say(f"{name}: {each} drives, {len(tally.alarms)} false alarms, {len(tally.flips)} flips; ")
-        say(f"made in {made - start:.1f} s, judged in {judged - made:.1f} s; ")
-        quarters = np.quantile([drive.clearance for drive in drives], [0.0, 0.25, 0.5])
-        say(f"clearance {' '.join(f'{x:.3f}' for x in quarters)}; not kept: {dict(refused)}\n")
-        for j, error in tally.alarms:
-            say(f"    drive {j}, {len(drives[j].q)} samples, clearance {drives[j].clearance:.3f}: {error}\n")
-        for j in tally.flips:
-            say(f"    drive {j}, {len(drives[j].q)} samples, clearance {drives[j].clearance:.3f}: flipped\n")
-        total.drives += tally.drives
-        total.alarms += tally.alarms
-        total.flips += tally.flips
-    say(f"{total.drives} drives, {len(total.alarms)} false alarms, {len(total.flips)} flips\n")
+        chain, rng, start = (
+            fb.load(fb.io.shipped_path(name)),
+            np.random.default_rng([int(seed), k]),
+            time.perf_counter(),
+        )
+        found = _blocked(chain, rng, each) if kind == "blocked" else _driven(chain, rng, each, kind == "tight")
+        sys.stdout.write(f"{name}, {time.perf_counter() - start:.1f} s: {_listed(found)}\n")
+        total.update(found)
+    sys.stdout.write(f"together: {_listed(total)}\n")
+
+
+def _driven(chain: fb.ClosedChain, rng: np.random.Generator, each: int, tight: bool) -> Counter[str]:
+    refused = Counter[str]()
+    drives = list(islice(random_drives(chain, rng, tight=tight, refused=refused), each))
+    tally = judge(chain, drives)
+    for k, what in [*tally.alarms, *((k, "flipped") for k in tally.flips)]:
+        sys.stdout.write(f"    drive {k}, {len(drives[k].q)} samples, clearance {drives[k].clearance:.3f}: {what}\n")
+    counts = {"drives": tally.drives, "false alarms": len(tally.alarms), "flips": len(tally.flips)}
+    return Counter({**counts, **{f"not kept: {why}": n for why, n in refused.items()}})
+
+
+def _blocked(chain: fb.ClosedChain, rng: np.random.Generator, each: int) -> Counter[str]:
+    blocked = list(islice(blocked_motions(chain, rng), each))
+    return Counter({"blocked": len(blocked), "went through": len(passed(chain, blocked))})
+
+
+def _listed(found: Counter[str]) -> str:
+    return ", ".join(f"{n} {what}" for what, n in found.items())
 
 
 if __name__ == "__main__":

@@ -71,6 +71,23 @@ def test_a_bound_that_no_motion_keeps_is_given_up():
         next(drives.random_drives(chain, np.random.default_rng(1), clear=2.0))
 
 
+ROUND = ("five_bar_case_I", "four_bar_crank_rocker", "six_bar_watt", "slider_crank")
+"""Mechanisms whose motors may turn as they like."""
+BLOCKED = [name for name in fb.io.shipped() if name not in ROUND]
+
+
+@pytest.mark.parametrize("name", BLOCKED)
+def test_motions_that_are_blocked_between_their_samples_are_refused(name):
+    chain, rng = shipped(name), np.random.default_rng(200 + fb.io.shipped().index(name))
+    blocked = list(islice(drives.blocked_motions(chain, rng), EACH))
+    assert len(blocked) == EACH and drives.passed(chain, blocked) == []
+
+
+def test_a_blocked_motion_that_is_driven_has_passed(one):
+    chain, drive = one
+    assert drives.passed(chain, [(drive.motion, drive.q[0])]) == [0]
+
+
 @pytest.fixture
 def one() -> tuple[fb.ClosedChain, drives.Drive]:
     chain = shipped("five_bar_case_I")
