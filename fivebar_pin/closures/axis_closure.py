@@ -39,6 +39,7 @@ class AxisClosure(FrameClosure):
     axis: npt.ArrayLike = (0.0, 0.0, 1.0)
 
     entries: ClassVar[tuple[Entry, ...]]
+    may_oppose: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         axis = checked("closure axis", self.axis, (3,))

@@ -10,12 +10,11 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
-from fivebar_pin.kinematics.follow import reach
+from fivebar_pin.kinematics.follow import open_by, reach
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.prepared import prepared_of
-from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual"]
 
@@ -96,23 +95,30 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
 
 
 def _assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
-    loops = loops_of(chain)
-    q = np.array(near[None])
-    here = Configurations(loops, q)
-    if loops.m and closed_enough(loops, here.gap, _FOLLOWED)[0] and not loops.opposed(here.pairs)[0]:
-        q, at = _turned(chain, loops, q, x)
-        if here.passive.sigma[0] >= SINGULAR:
-            reached = reach(loops, prepared_of(chain), q[0], np.stack([at, x]))[1:]
-            there = Configurations(loops, reached)
-            if not closed_enough(loops, there.gap, tolerance)[0]:
-                raise open_message(loops, there.residual[0], f"at the actuated coordinates {x.tolist()}")
-            return np.asarray(reached[0])
-        if np.array_equal(at, x) and closed_enough(loops, here.gap, tolerance)[0]:
-            return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
+    loops, ready, q = loops_of(chain), prepared_of(chain), np.array(near[None])
+    if loops.m and closed_enough(loops, open_by(ready, q), _FOLLOWED) and not _opposed(loops, q):
+        turned, at = _turned(chain, loops, q, x)
+        try:
+            reached, gap = reach(loops, ready, turned[0], np.array([at, x]))
+        except SingularityError as error:
+            if error.sample:
+                raise
+            if np.array_equal(at, x) and closed_enough(loops, Configurations(loops, q).gap, tolerance)[0]:
+                return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
+        else:
+            if not closed_enough(loops, max(gap[1], ready.left), tolerance):
+                residual = residual_of(loops, reached[1:])[0]
+                raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()}")
+            return np.asarray(reached[1])
     loops.set_actuated(q, x)
     if not loops.m:
         return np.asarray(q[0])
     return _searched_near(loops, q, x, tolerance)
+
+
+def _opposed(loops: Loops, q: Array) -> bool:
+    """Tell whether a hinge of q (1, nq) is closed with its axes against each other."""
+    return loops.may_oppose and bool(loops.opposed(loops.pairs(loops.tree.poses(q)))[0])
 
 
 def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:

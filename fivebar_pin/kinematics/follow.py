@@ -22,7 +22,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
 from fivebar_pin.mechanism.prepared import Prepared
 
-__all__ = ["Followed", "follow", "reach", "singular"]
+__all__ = ["Followed", "follow", "open_by", "reach", "singular"]
 
 
 _CHUNK = 4096  # samples that are followed one after the other
@@ -55,18 +55,27 @@ class Followed:
         return Followed(self.q[k], self.v[k], self.a[k], self.N[k], self.gap[k])
 
 
-def reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> Array:
+def reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Array]:
     """Return the configurations (n, nq) on the branch of q0 (nq,), closed at X[0], along straight lines to X (n, na).
+
+    Their closure residuals (n,) [m or rad] are the second result.
 
     Raises:
         SingularityError, AssemblyError: the way is blocked; with an attribute `sample` at the end not reached.
         InvalidInputError: the closures tie the motors to each other; a line too long.
     """
     _require_near(loops, X)
-    q, error = _reach(loops, ready, q0, X)
+    q, gap, error = _reach(loops, ready, q0, X)
     if error is not None:
         raise error
-    return q
+    return q, gap
+
+
+def open_by(ready: Prepared, q: Array) -> float:
+    """Return the largest closure residual at q (1, nq) [m or rad], that of rows which say nothing left out."""
+    from fivebar_pin.engine.entries import residual
+
+    return float(residual(ready.I, ready.memory(), frozen(q)))
 
 
 def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int) -> Followed:
@@ -83,7 +92,7 @@ def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array,
     if len(chunks) == 1:
         chunks[0].follow(q0)
     else:
-        begun, _ = _reach(loops, ready, q0, X[::_CHUNK])
+        begun, _, _ = _reach(loops, ready, q0, X[::_CHUNK])
         begun[0] = q0
         each(lambda c: chunks[c].follow(begun[c]), len(chunks), threads)
     for chunk, after in zip(chunks, [*chunks[1:], None], strict=True):
@@ -127,20 +136,20 @@ class _Chunk:
             self.error = _blocked(self._loops, self._ready, self._q[done], done)
             _at(self.error, self._first + done)
         elif len(self._line) > 1:
-            ends, self.error = _reach(self._loops, self._ready, out.q[-1], self._line)
+            ends, _, self.error = _reach(self._loops, self._ready, out.q[-1], self._line)
             self.end = ends[1]
             if self.error is not None:
                 _at(self.error, self._first + done)
 
 
-def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Blocked | None]:
-    """Return the configurations reached, nan where none were, and why."""
+def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Array, Blocked | None]:
+    """Return the configurations reached, nan where none were, their residuals, and why."""
     from fivebar_pin.engine.entries import reach
 
-    q = np.full((X.shape[0], q0.size), np.nan)
+    q, gap = np.full((X.shape[0], q0.size), np.nan), np.empty(X.shape[0])
     q[0] = q0
-    done = reach(ready.I, ready.memory(), frozen(X), q)
-    return q, _at(_blocked(loops, ready, X[done], done), done) if done < X.shape[0] else None
+    done = reach(ready.I, ready.memory(), frozen(X), q, gap)
+    return q, gap, _at(_blocked(loops, ready, X[done], done), done) if done < X.shape[0] else None
 
 
 def _require_near(loops: Loops, X: Array) -> None:

@@ -224,6 +224,21 @@ class Loops:
         poses, pairs = self._generic
         return [c.jacobian(x, poses) for c, x in zip(self.anchored, pairs, strict=True)]
 
+    @property
+    def may_oppose(self) -> bool:
+        """Whether some closure can be met falsely, axes against each other."""
+        return any(c.may_oppose for c in self.closures)
+
+    @property
+    def left(self) -> float:
+        """What combinations of rows that no motion changes leave open, whatever the configuration [m, rad or -]."""
+        if not self.m:
+            return 0.0
+        _, pairs = self._generic
+        residual = self.residual(pairs)[0] * self.row_scale
+        Q, _ = np.linalg.qr((self.reduce / self.row_scale).T)
+        return float(np.abs((residual - Q @ (Q.T @ residual)) / self.row_scale * self.unit).max())
+
     @cached_property
     def _generic(self) -> tuple[Poses, list[Any]]:
         rng = np.random.default_rng(7)

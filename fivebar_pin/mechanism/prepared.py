@@ -28,10 +28,12 @@ class Prepared:
         I: records of the chain, never written.
         W: its constants, and working memory as it is before the first sample; never written.
         nq: length of a configuration.
+        left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they are
+            [m, rad or -].
     """
 
-    def __init__(self, I: Integers, W: Array) -> None:
-        self.I, self.W, self.nq = I, W, int(I[NQ])
+    def __init__(self, I: Integers, W: Array, left: float) -> None:
+        self.I, self.W, self.nq, self.left = I, W, int(I[NQ]), left
         for vector in (I, W):
             seal(vector)
         self._threads = threading.local()
@@ -57,12 +59,16 @@ def prepared_of(chain: ClosedChain) -> Prepared:
         wide = [_spread(kept[k][1], loops.anchored[k].columns, chain.nv) for k in group.members]
         systems.append((rows, loops.passive[group.passive], _combinations(np.concatenate(wide))))
     blocks = blocks_of(systems, touched, chain.actuated_index)
-    rows_kept = [rows for rows, _ in kept]
-    return Prepared(
-        *layout_of(
-            Parts(chain, links_of(chain.model), loops.anchored, rows_kept, blocks, loops.column_scale, loops.length)
-        )
+    parts = Parts(
+        chain,
+        links_of(chain.model),
+        loops.anchored,
+        [rows for rows, _ in kept],
+        blocks,
+        loops.column_scale,
+        loops.length,
     )
+    return Prepared(*layout_of(parts), loops.left)
 
 
 def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], Array]:
