@@ -14,9 +14,9 @@ from fivebar_pin.kinematics.follow import open_by, reach
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
-from fivebar_pin.mechanism.prepared import prepared_of
+from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 
-__all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual"]
+__all__ = ["assemble", "assemble_near", "checked_search", "closed_from_starts", "closure_residual"]
 
 
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
@@ -61,10 +61,10 @@ def assemble(
         return np.stack(each) if each else np.zeros((0, chain.nq))
     x = checked("q_actuated", x, (chain.na,))
     if near is not None:
-        return _assemble_near(chain, x, checked("near", near, (chain.nq,)), tolerance)
+        return assemble_near(chain, x, checked("near", near, (chain.nq,)), tolerance)
     for reference in chain.references.values():
         with contextlib.suppress(AssemblyError, SingularityError):
-            return _assemble_near(chain, x, reference, tolerance)
+            return assemble_near(chain, x, reference, tolerance)
     q, residual = closed_from_starts(chain, loops, x, starts, seed, tolerance)
     if not q.shape[0]:
         raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")
@@ -94,10 +94,11 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
     return loops
 
 
-def _assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
+def assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
+    """Return the configuration (nq,) at actuated coordinates x (na,) that a configuration (nq,) picks."""
     loops, ready, q = loops_of(chain), prepared_of(chain), np.array(near[None])
     if loops.m and closed_enough(loops, open_by(ready, q), _FOLLOWED) and not _opposed(loops, q):
-        turned, at = _turned(chain, loops, q, x)
+        turned, at = _turned(loops, ready, q, x)
         try:
             reached, gap = reach(loops, ready, turned[0], np.array([at, x]))
         except SingularityError as error:
@@ -143,20 +144,18 @@ def _nudged(loops: Loops, q: Array, x: Array) -> Array:
     return starts
 
 
-def _turned(chain: ClosedChain, loops: Loops, q: Array, x: Array) -> tuple[Array, Array]:
+def _turned(loops: Loops, ready: Prepared, q: Array, x: Array) -> tuple[Array, Array]:
     """Return q (1, nq) with whole turns added that lead towards x (na,), and its actuated coordinates (na,).
 
     A turn of a joint that no closure counts leads to the same pose. A joint whose coordinates are a cosine and a sine
     is in the turn nearest to x; others keep the sense in which they turn.
     """
-    at, counted = loops.actuated_of(q)[0], _counted(chain)
-    for a, k in enumerate(loops.actuated):
-        turns = (x[a] - at[a]) / (2.0 * np.pi)
-        if loops.tree.is_cyclic(int(k)):
-            at[a] += 2.0 * np.pi * np.round(turns)
-        elif loops.tree.is_angle(int(k)) and int(k) not in counted:
-            at[a] += 2.0 * np.pi * np.trunc(turns)
-    turned = np.array(q)
+    at, (whole, cyclic) = loops.actuated_of(q)[0], ready.turns
+    turns = (x - at) / (2.0 * np.pi)
+    turns = np.where(cyclic, np.round(turns), np.where(whole, np.trunc(turns), 0.0))
+    if not turns.any():
+        return q, at
+    at, turned = at + 2.0 * np.pi * turns, np.array(q)
     loops.set_actuated(turned, at)
     return turned, at
 
