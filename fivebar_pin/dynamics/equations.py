@@ -151,7 +151,7 @@ class EquationsOfMotion:
         """Return the second rate of the closures at zero joint accelerations (n, m), the loops being closed."""
         loops, n = self.manifold.loops, v.shape[0]
         if n > _FEW or not all(c.by_points for c in self.chain.closures):
-            return loops.drift(point.pairs, loops.tree.rates(point.q, v, point.poses))
+            return loops.drift(point.pairs, loops.tree.rates(point.q, v))
         model, data, out, still = self.chain.model, self.data, np.empty((n, loops.m)), np.zeros(self.chain.nv)
         for i in range(n):
             pin.forwardKinematics(model, data, point.q[i], v[i], still)

@@ -75,7 +75,7 @@ def reactions(
     loops = loops_of(chain)
     tree = loops.tree
     poses = tree.poses(trajectory.q)
-    rates = tree.rates(trajectory.q, trajectory.v, poses)
+    rates = tree.rates(trajectory.q, trajectory.v)
     bodies = Bodies.of(chain)
     moving = body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
@@ -88,7 +88,7 @@ def reactions(
     slack = _carried(chain, loops, np.zeros((*forces.free.shape[:2], *carried.shape[1:])), forces.free)
     unit = np.r_[np.ones(3), np.full(3, chain.length)]
     closure = _seen(forces.wrench, forces.free, forces.point, forces.axes, unit)
-    joint = _seen(carried, slack, np.stack(poses.p[1:], axis=1), np.stack(poses.R[1:], axis=1), unit)
+    joint = _seen(carried, slack, np.swapaxes(poses.p[1:], 0, 1), np.swapaxes(poses.R[1:], 0, 1), unit)
     return Reactions(
         forces.multipliers,
         forces.determinate_rows,

@@ -254,3 +254,6 @@ def _fly(W: Array, k: int, u: Vector, phi: Vector) -> None:
     d = add(add(u, scaled(0.5 * half * half, across)), scaled(third, cross(phi, across)))
     put(W, k, add(vector_at(W, k), times(_of_quaternion(W, k + 3), d)))
     _turn_quaternion(W, k + 3, phi)
+    if cos(0.5 * angle) < 0.0:  # of the two quaternions Pinocchio takes the one near that before
+        for i in range(k + 3, k + 7):
+            W[i] = -W[i]

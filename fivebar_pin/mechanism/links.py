@@ -55,7 +55,7 @@ class _Part:
     pitch: float = 0.0
 
 
-_TURN, _SHIFT, _TWIST = ((2, motion) for motion in (e.TURN, e.SHIFT, e.TWIST))
+_TURN, _SHIFT, _TWIST = ((2, motion) for motion in (e.TURN, e.SHIFT, e.HELIX))
 _COLUMNS: dict[int, tuple[tuple[int, int], ...]] = {
     e.REVOLUTE: (_TURN,),
     e.TURNING: (_TURN,),
