@@ -79,7 +79,7 @@ def subspace(I: Integers, W: Array, c: int) -> tuple[Vector, Vector]:
     """Return the motion subspace of a velocity coordinate."""
     e, turning, zero = axis_at(W, I[c + AXIS]), I[c + MOTION] != SHIFT, (0.0, 0.0, 0.0)
     carried = cross(vector_at(W, I[c + CENTRE]), e)
-    slide = 1.0 if not turning else 0.0 if I[c + MOTION] == TURN else W[I[c + PITCH]]
+    slide = 0.0 if I[c + MOTION] == TURN else W[I[c + PITCH]]
     return add(carried if turning else zero, scaled(slide, e)), e if turning else zero
 
 

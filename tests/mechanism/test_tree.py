@@ -47,6 +47,7 @@ JOINTS = {
     "PY": pin.JointModelPY,
     "PZ": pin.JointModelPZ,
     "prismatic": lambda: pin.JointModelPrismaticUnaligned(SLANTED),
+    "prismatic of another length": lambda: pin.JointModelPrismaticUnaligned(2.0 * SLANTED),
     "spherical": pin.JointModelSpherical,
     "spherical ZYX": pin.JointModelSphericalZYX,
     "translation": pin.JointModelTranslation,
