@@ -1,4 +1,4 @@
-"""The open tree over batches: poses, motion subspaces, velocities and bias accelerations of joints, in Pinocchio's terms.
+"""Tree and closures over batches, in Pinocchio's terms: for those who look at many configurations at once.
 
 Spatial quantities are linear before angular, in world axes at the world origin: with the velocity v and acceleration a of
 the origin p of a link that turns with ω, α,
@@ -11,37 +11,63 @@ from __future__ import annotations
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.entries import read, write
+from fivebar_pin.engine.rows import drifts, frame_of, jacobian, look
 from fivebar_pin.engine.tables import (
     A_HERE,
     ACCELERATION,
     ALPHA,
     AXIS,
     CENTRE,
+    CLOSURE_SIZE,
+    CLOSURES,
+    CLOSURES_END,
+    COLUMN,
     COLUMN_SIZE,
     COLUMNS,
+    DIRECTION,
+    ENTRIES,
+    ENTRIES_END,
+    ENTRY_SIZE,
+    FORCE,
+    FRAMES,
+    JACOBIAN0,
+    LEAD,
     LINK_SIZE,
     LINKS,
+    MOMENT,
     MOTION,
     NQ,
     NV,
     OMEGA,
     ORIGIN,
     PITCH,
+    POINT,
     POSE,
+    POSE1,
     Q_HERE,
     RATE,
+    RESIDUAL,
     ROTATION,
+    ROW0,
+    ROW0_END,
+    ROW_SIZE,
+    ROWS,
+    ROWS_END,
+    SECOND_FRAME,
     SHIFT,
+    TIES,
     TURN,
+    UNIT,
     V_HERE,
     VELOCITY,
-    X,
+    WRENCH,
     Integers,
+    X,
 )
 from fivebar_pin.engine.tree import accelerate, integrate, move, place
 from fivebar_pin.engine.vectors import Vector, add, axis_at, cross, scaled, sub, vector_at
 
-__all__ = ["integrated", "poses", "rates"]
+__all__ = ["closures", "drift", "integrated", "poses", "rates"]
 
 
 @entry
@@ -114,3 +140,63 @@ def integrated(I: Integers, W: Array, q: Array, x: Array, out: Array) -> None:
         read(W, I[X], x, i, I[NV])
         integrate(I, W, I[X])
         write(W, I[Q_HERE], out, i, I[NQ])
+
+
+@entry
+def closures(I: Integers, W: Array, q: Array, residual: Array, J: Array, T: Array, frames: Array) -> None:
+    """Write what closures are at configurations.
+
+    Args:
+        I, W: the chain and working memory.
+        q: configurations (n, nq).
+        residual: of all rows, is written (n, m).
+        J: entries of the closure Jacobian that can differ from zero are written (n, m, nv).
+        T: wrench on body 2 of a unit force in every row, world axes and origin, is written (n, m, 6).
+        frames: of closures between frames R_1, p_1, R_2, p_2 are written, row by row (n, closures, 24).
+    """
+    for i in range(q.shape[0]):
+        read(W, I[Q_HERE], q, i, I[NQ])
+        place(I, W)
+        look(I, W)
+        jacobian(I, W)
+        k, c = 0, 0
+        for at in range(I[CLOSURES], I[CLOSURES_END], CLOSURE_SIZE):
+            for r in range(I[at + ROW0], I[at + ROW0_END], ROW_SIZE):
+                unit = 1.0 / W[I[r + DIRECTION] + UNIT]
+                residual[i, k] = unit * W[I[r + RESIDUAL]]
+                m = I[r + JACOBIAN0]
+                for e in range(I[r + ENTRIES], I[r + ENTRIES_END], ENTRY_SIZE):
+                    J[i, k, I[e + COLUMN]] = unit * W[m]
+                    m += 1
+                if I[at + TIES] == 0:
+                    f = vector_at(W, I[r + WRENCH] + FORCE)
+                    moment = add(vector_at(W, I[r + WRENCH] + MOMENT), cross(vector_at(W, I[r + WRENCH] + POINT), f))
+                    for a in range(3):
+                        T[i, k, a], T[i, k, 3 + a] = unit * f[a], unit * moment[a]
+                k += 1
+            if I[at + TIES] == 0:
+                for side in range(2):
+                    R, p = frame_of(W, I[at + POSE1 + side], I[at + FRAMES] + SECOND_FRAME * side)
+                    for a in range(9):
+                        frames[i, c, 12 * side + a] = R[a]
+                    for a in range(3):
+                        frames[i, c, 12 * side + 9 + a] = p[a]
+            c += 1
+
+
+@entry
+def drift(I: Integers, W: Array, q: Array, v: Array, out: Array) -> None:
+    """Write the second rates of all rows at no joint accelerations (n, m)."""
+    for k in range(I[NV]):
+        W[I[A_HERE] + k] = 0.0
+    for i in range(q.shape[0]):
+        read(W, I[Q_HERE], q, i, I[NQ])
+        read(W, I[V_HERE], v, i, I[NV])
+        place(I, W)
+        move(I, W)
+        accelerate(I, W)
+        drifts(I, W)
+        k = 0
+        for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
+            out[i, k] = W[I[r + LEAD]] / W[I[r + DIRECTION] + UNIT]
+            k += 1
