@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,9 @@ from tied_chains import EXAMPLES
 
 import fivebar_pin as fb
 from fivebar_pin import JointSpring, Spring
+from fivebar_pin.cli import main
 from fivebar_pin.cli._moving import sway
+from fivebar_pin.dynamics import inverse
 from fivebar_pin.dynamics.by_complement import _CHUNK
 from fivebar_pin.dynamics.inverse import ROADS, roads_apart
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
@@ -218,3 +221,48 @@ def test_the_results_cannot_be_written_to(road):
     for name in (*QUANTITIES, "tree_torque", "about"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(loads, name)[0] = 0.0
+
+
+def test_a_diagnosis_says_how_far_the_roads_lie_apart():
+    found = fb.diagnose(five_bar(base=TILTED))
+    assert found.roads_apart is not None
+    assert 0.0 < found.roads_apart < 1e-14
+    told = re.search(r"torques +by Pinocchio and by the complement differ by (\S+) of what adds up to them", str(found))
+    assert told is not None
+    assert float(told[1]) == pytest.approx(found.roads_apart, rel=0.6)
+
+
+@pytest.mark.parametrize("actuated", [(), ("left",), ("left", "right", "left_elbow")])
+def test_it_compares_nothing_where_the_motors_do_not_determine_the_motion(actuated):
+    found = fb.diagnose(five_bar().with_actuated(actuated))
+    assert found.roads_apart is None
+    assert "by the complement" not in str(found)
+
+
+def test_it_compares_nothing_where_a_force_has_no_direction():
+    found = fb.diagnose(five_bar().with_springs((Spring("tip_left", "tip_right", 5.0, 0.1),)))
+    assert found.roads_apart is None
+    assert found.ok
+
+
+def test_roads_that_disagree_are_an_error_of_the_diagnosis(monkeypatch):
+    def wrong(*given):
+        loads = ROADS["complement"](*given)
+        return replace(loads, torque=loads.torque * (1.0 + 1e-8))
+
+    monkeypatch.setattr(inverse, "ROADS", {"pinocchio": wrong, "complement": ROADS["complement"]})
+    found = fb.diagnose(five_bar())
+    assert not found.ok
+    assert "differ by" in str(found.problems[0])
+
+
+def test_check_compares_the_roads_along_a_motion(capsys, tmp_path):
+    chain, path = path_of(4)
+    fb.save(chain, tmp_path / "five.xml")
+    index = chain.actuated_index
+    motion = fb.Motion(path.t, path.q[:, index], path.v[:, index], path.a[:, index])
+    fb.motion.to_file(motion, tmp_path / "motion.csv", chain.actuated)
+    assert main(["check", str(tmp_path / "five.xml"), "--motion", str(tmp_path / "motion.csv")]) == 0
+    assert re.search(
+        r"^along the motion, 4 samples: torques by Pinocchio .* differ by \de-1\d ", capsys.readouterr().out, re.M
+    )
