@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import TINY, Array, checked, frozen, integer
+from fivebar_pin._arrays import TINY, Array, checked, finite, frozen, integer
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.by_complement import by_complement
 from fivebar_pin.dynamics.by_pinocchio import by_pinocchio
@@ -86,6 +86,7 @@ def inverse_dynamics(
     return ROADS[road](chain, trajectory, point, applied, threads)
 
 
+@finite()
 def roads_apart(chain: ClosedChain, trajectory: Trajectory) -> float:
     """Return the largest difference of the torques by the two roads, in parts of what adds up to a torque [-]."""
     one, two = (inverse_dynamics(chain, trajectory, road=road) for road in ROADS)

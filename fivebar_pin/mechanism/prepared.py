@@ -90,7 +90,7 @@ def _spread(J: Array, columns: Index, nv: int) -> Array:
     """Return rows of a closure at all samples side by side, in all columns (rows, n nv)."""
     whole = np.zeros((J.shape[1], J.shape[0], nv))
     whole[:, :, columns] = np.swapaxes(J, 0, 1)
-    return whole.reshape(J.shape[1], -1)
+    return whole.reshape(J.shape[1], J.shape[0] * nv)
 
 
 def _combinations(wide: Array) -> Array | None:
