@@ -7,9 +7,10 @@ import argparse
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import ladder, mechanisms, roads, scoring
+from benchmarks import foreign, ladder, mechanisms, roads, robot, scoring
+from benchmarks.machine import machine
 
-PARTS = ("roads", "mechanisms", "ladder", "assemblies", "scoring")
+PARTS = ("roads", "foreign", "mechanisms", "robot", "ladder", "assemblies", "scoring")
 
 
 def main() -> None:
@@ -20,15 +21,23 @@ def main() -> None:
     parser.add_argument("--designs", type=int, default=1_000_000, help="mass distributions to score [1000000]")
     chosen = parser.parse_args()
     console = Console(width=150)
+    console.print(machine())
     if "roads" in chosen.which:
         rows = roads.rows(tuple(chosen.samples))
         _show(console, "Five-bar, torque and shaking wrench, per sample", roads.HEADINGS, rows)
+    if "foreign" in chosen.which:
+        rows, missing = foreign.rows()
+        _show(console, "Five-bar in other engines, torque of both motors, per sample", foreign.HEADINGS, rows)
+        console.print(*missing, sep="\n")
     if "mechanisms" in chosen.which:
         _show(console, "Shipped mechanisms, torque and shaking wrench", mechanisms.HEADINGS, mechanisms.rows())
+    if "robot" in chosen.which:
+        _show(console, "Four legs, 40 joints, 24 motors, 8 loops", robot.HEADINGS, robot.rows())
     if "ladder" in chosen.which:
-        rows, side, stacked = ladder.rows()
-        _show(console, "N five-bars, torque and shaking wrench, per sample", ladder.HEADINGS, rows)
-        console.print(f"cost per sample grows as N^{side:.2f} side by side, N^{stacked:.2f} stacked")
+        rows, powers = ladder.rows()
+        _show(console, "N four-bars, torque and shaking wrench, per sample", ladder.HEADINGS, rows)
+        own, own_hand, one, one_hand = (f"N^{power:.2f}" for power in powers)
+        console.print(f"cost grows as {own} with own cranks (by hand {own_hand}), as {one} with one ({one_hand})")
     if "assemblies" in chosen.which:
         rows = mechanisms.assemblies(chosen.assemblies)
         _show(console, "Random assemblies", mechanisms.ASSEMBLIES, rows)

@@ -7,10 +7,20 @@ from collections import Counter
 import numpy as np
 
 import fivebar_pin as fb
-from benchmarks import handwritten
+from benchmarks.handwritten import HandLoop
+from benchmarks.positions import closed_form
 from benchmarks.timing import best_of
 
-HEADINGS = ("mechanism", "coordinates", "rows", "hand-written loop", "this library", "ratio", "worst difference")
+HEADINGS = (
+    "mechanism",
+    "coordinates",
+    "rows",
+    "positions by hand",
+    "hand-written loop",
+    "this library",
+    "ratio",
+    "worst difference",
+)
 ASSEMBLIES = ("mechanism", "tried", "closed", "out of reach", "singular", "worst residual", "left its branch")
 SAMPLES = 1000
 
@@ -21,8 +31,9 @@ def rows() -> list[tuple[str, ...]]:
     for name in fb.io.shipped():
         chain = fb.load(fb.io.shipped_path(name))
         motion, q0 = _swing(chain)
-        prepared = handwritten.prepare(chain, q0)
-        loop, by_hand = best_of(lambda: handwritten.torque_and_shaking(prepared, q0, motion))  # noqa: B023
+        position = closed_form(chain, q0)
+        hand = HandLoop(chain, q0, position)
+        loop, by_hand = best_of(lambda: hand.run(motion))  # noqa: B023
         road, loads = best_of(lambda: fb.inverse_dynamics(chain, fb.drive(chain, motion, near=q0)))  # noqa: B023
         scale = max(float(np.abs(by_hand[0]).max()), 1e-12)
         out.append(
@@ -30,6 +41,7 @@ def rows() -> list[tuple[str, ...]]:
                 name,
                 f"{chain.nv}",
                 f"{sum(c.kind.rows for c in chain.closures)}",
+                "Newton" if position is None else "closed form",
                 f"{1e6 * loop / SAMPLES:.3g} us",
                 f"{1e6 * road / SAMPLES:.3g} us",
                 f"{loop / road:.1f} x",

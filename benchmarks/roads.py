@@ -1,11 +1,15 @@
-"""The closed-form road and the Pinocchio road of the five-bar against a hand-written Pinocchio loop."""
+"""The closed-form road and the Pinocchio road of the five-bar against a hand-written Pinocchio loop.
+
+The loop has its positions in closed form too.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 import fivebar_pin as fb
-from benchmarks import handwritten
+from benchmarks.handwritten import HandLoop
+from benchmarks.positions import closed_form
 from benchmarks.timing import best_of
 from fivebar_pin import paper
 
@@ -26,7 +30,8 @@ def rows(samples: tuple[int, ...]) -> list[tuple[str, ...]]:
     """Measure torque and shaking wrench from the motion of the motors, microseconds per sample."""
     linkage = paper.table_1("I", "unbalanced")
     chain = linkage.chain()
-    prepared = handwritten.prepare(chain, linkage.configuration(0.5, 1.5, mode=paper.AssemblyMode.LEFT))
+    home = linkage.configuration(0.5, 1.5, mode=paper.AssemblyMode.LEFT)
+    hand = HandLoop(chain, home, closed_form(chain, home))
     out = []
     for n in samples:
         motion = paper.default_motion(samples=max(n, 2))
@@ -37,10 +42,8 @@ def rows(samples: tuple[int, ...]) -> list[tuple[str, ...]]:
         def pinocchio_road(motion=motion, q0=q0):
             return fb.inverse_dynamics(chain, fb.drive(chain, motion, near=q0))
 
-        loop, by_hand = best_of(lambda: handwritten.torque_and_shaking(prepared, q0, motion))  # noqa: B023
-        loop_all, _ = best_of(
-            lambda: handwritten.torque_and_shaking(prepared, q0, motion, joint_forces=True)  # noqa: B023
-        )
+        loop, by_hand = best_of(lambda: hand.run(motion))  # noqa: B023
+        loop_all, _ = best_of(lambda: hand.run(motion, joint_forces=True))  # noqa: B023
         road, loads = best_of(pinocchio_road)
         road_all, _ = best_of(lambda: pinocchio_road().joint_reactions)
         closed, solution = best_of(lambda: paper.solve(linkage, motion, mode=paper.AssemblyMode.LEFT))  # noqa: B023
@@ -50,5 +53,5 @@ def rows(samples: tuple[int, ...]) -> list[tuple[str, ...]]:
             for x in (loads.torque, solution.torque)
         )
         micro = [f"{1e6 * t / n:.3g} us" for t in (loop, loop_all, road, road_all, closed)]
-        out.append((f"{n}", *micro, f"{loop / road:.1f} x", f"{loop / closed:.0f} x", f"{difference:.1e}"))
+        out.append((f"{n}", *micro, f"{loop / road:.2g} x", f"{loop / closed:.2g} x", f"{difference:.1e}"))
     return out

@@ -10,13 +10,13 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
-from fivebar_pin.kinematics.branch import follow, node_at
+from fivebar_pin.kinematics.follow import open_by, reach
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
-from fivebar_pin.mechanism.rank import SINGULAR
+from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 
-__all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual"]
+__all__ = ["assemble", "assemble_near", "checked_search", "closed_from_starts", "closure_residual"]
 
 
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
@@ -61,10 +61,10 @@ def assemble(
         return np.stack(each) if each else np.zeros((0, chain.nq))
     x = checked("q_actuated", x, (chain.na,))
     if near is not None:
-        return _assemble_near(loops, x, checked("near", near, (chain.nq,)), tolerance)
+        return assemble_near(chain, x, checked("near", near, (chain.nq,)), tolerance)
     for reference in chain.references.values():
         with contextlib.suppress(AssemblyError, SingularityError):
-            return _assemble_near(loops, x, reference, tolerance)
+            return assemble_near(chain, x, reference, tolerance)
     q, residual = closed_from_starts(chain, loops, x, starts, seed, tolerance)
     if not q.shape[0]:
         raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")
@@ -94,24 +94,32 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
     return loops
 
 
-def _assemble_near(loops: Loops, x: Array, near: Array, tolerance: float) -> Array:
-    q = np.array(near[None])
-    here = Configurations(loops, q)
-    if loops.m and closed_enough(loops, here.gap, _FOLLOWED)[0] and not loops.opposed(here.pairs)[0]:
-        at = _actuated_at(loops, q, x)
-        node = node_at(loops, q[0], at)
-        if node.sigma >= SINGULAR:
-            closed = polish(loops, follow(loops, node, x).q[None])
-            if not closed_enough(loops, closed.residual, tolerance)[0]:
-                raise open_message(loops, residual_of(loops, closed.q)[0], f"at the actuated coordinates {x.tolist()}")
-            loops.set_actuated(closed.q, x)
-            return np.asarray(closed.q[0])
-        if np.array_equal(at, x) and closed_enough(loops, here.gap, tolerance)[0]:
-            return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
+def assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
+    """Return the configuration (nq,) at actuated coordinates x (na,) that a configuration (nq,) picks."""
+    loops, ready, q = loops_of(chain), prepared_of(chain), np.array(near[None])
+    if loops.m and closed_enough(loops, open_by(ready, q), _FOLLOWED) and not _opposed(loops, q):
+        turned, at = _turned(loops, ready, q, x)
+        try:
+            reached, gap = reach(loops, ready, turned[0], np.array([at, x]))
+        except SingularityError as error:
+            if error.sample:
+                raise
+            if np.array_equal(at, x) and closed_enough(loops, Configurations(loops, q).gap, tolerance)[0]:
+                return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
+        else:
+            if not closed_enough(loops, max(gap[1], ready.left), tolerance):
+                residual = residual_of(loops, reached[1:])[0]
+                raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()}")
+            return np.asarray(reached[1])
     loops.set_actuated(q, x)
     if not loops.m:
         return np.asarray(q[0])
     return _searched_near(loops, q, x, tolerance)
+
+
+def _opposed(loops: Loops, q: Array) -> bool:
+    """Tell whether a hinge of q (1, nq) is closed with its axes against each other."""
+    return loops.may_oppose and bool(loops.opposed(loops.pairs(loops.tree.poses(q)))[0])
 
 
 def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:
@@ -136,11 +144,20 @@ def _nudged(loops: Loops, q: Array, x: Array) -> Array:
     return starts
 
 
-def _actuated_at(loops: Loops, q: Array, x: Array) -> Array:
-    """Return the actuated coordinates (na,) of q (1, nq); unbounded joints count from the turn nearest to x."""
-    at = loops.actuated_of(q)[0]
-    turn = 2.0 * np.pi * np.array([loops.tree.is_cyclic(int(k)) for k in loops.actuated], dtype=np.float64)
-    return np.asarray(at + turn * np.round((x - at) / (2.0 * np.pi)))
+def _turned(loops: Loops, ready: Prepared, q: Array, x: Array) -> tuple[Array, Array]:
+    """Return q (1, nq) with whole turns added that lead towards x (na,), and its actuated coordinates (na,).
+
+    A turn of a joint that no closure counts leads to the same pose. A joint whose coordinates are a cosine and a sine
+    is in the turn nearest to x; others keep the sense in which they turn.
+    """
+    at, (whole, cyclic) = loops.actuated_of(q)[0], ready.turns
+    turns = (x - at) / (2.0 * np.pi)
+    turns = np.where(cyclic, np.round(turns), np.where(whole, np.trunc(turns), 0.0))
+    if not turns.any():
+        return q, at
+    at, turned = at + 2.0 * np.pi * turns, np.array(q)
+    loops.set_actuated(turned, at)
+    return turned, at
 
 
 def closed_from_starts(

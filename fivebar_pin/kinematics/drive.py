@@ -7,15 +7,15 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, finite
+from fivebar_pin._arrays import Array, checked, finite, number, seal
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.engine.threads import threads_of
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
-from fivebar_pin.kinematics.assemble import assemble
-from fivebar_pin.kinematics.branch import track
-from fivebar_pin.mechanism.closing import CLOSED
-from fivebar_pin.mechanism.complement import rates_of
-from fivebar_pin.mechanism.configurations import Configurations
-from fivebar_pin.mechanism.loops import loops_of
+from fivebar_pin.kinematics.assemble import assemble, assemble_near
+from fivebar_pin.kinematics.follow import follow
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
+from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
+from fivebar_pin.mechanism.prepared import prepared_of
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
@@ -23,7 +23,6 @@ __all__ = ["drive"]
 
 
 _SLACK = 1e-9  # how far beyond a limit a coordinate still lies on it: closing leaves less [rad or m]
-_BLOCK = 4096  # samples worked on at a time, so that intermediate arrays stay in cache
 
 
 @finite()
@@ -34,6 +33,7 @@ def drive(
     *,
     tolerance: float = CLOSED,
     limits: Literal["check", "ignore"] = "check",
+    threads: int | None = None,
 ) -> Trajectory:
     """Move the whole mechanism from the motion of its actuated joints, on one assembly mode.
 
@@ -43,16 +43,18 @@ def drive(
         near: configuration (nq,) that picks the assembly mode, see `assemble`.
         tolerance: closure residual to reach [m or rad; relative to the chain's length above 1 m].
         limits: whether the joint limits of the model are checked.
+        threads: at most so many at once, for long motions; as many as there are processors unless given. The result
+            is the same to the last digit.
 
     Returns:
         q, v, a of all joints, consistent with each other, the complement N and the closure residual.
 
     Raises:
         AssemblyError: a sample out of reach; names sample, time, closure and gap.
-        BranchError: the motion cannot be followed without changing the assembly mode.
         SingularityError: the motion meets a type 2 singularity; names sample and time.
         InvalidInputError: motion of the wrong width, joint limits passed, motion left undetermined.
     """
+    number("tolerance", tolerance, positive=True)
     loops = loops_of(chain)
     loops.require_determined()
     if motion.na != chain.na:
@@ -60,25 +62,34 @@ def drive(
             "motion columns", motion.na, f"must be {chain.na}, one for each of {', '.join(chain.actuated)}"
         )
     try:
-        q0 = assemble(chain, motion.q[0], near, tolerance=tolerance)
-        closed = track(loops, q0, motion.q, tolerance)
+        if near is None:
+            q0 = assemble(chain, motion.q[0], tolerance=tolerance)
+        else:
+            q0 = assemble_near(chain, motion.q[0], checked("near", near, (chain.nq,)), tolerance)
+        found = follow(loops, prepared_of(chain), q0, (motion.q, motion.v, motion.a), threads_of(threads))
+        _require_closed(loops, found.q, found.gap, tolerance)
     except (AssemblyError, SingularityError) as error:
         raise _with_time(error, motion) from None
     if limits == "check":
-        _check_limits(chain, closed.q, motion)
-    parts = [
-        rates_of(Configurations(loops, closed.q[k : k + _BLOCK]), motion.v[k : k + _BLOCK], motion.a[k : k + _BLOCK])
-        for k in range(0, len(motion), _BLOCK)
-    ]
-    v, a, N = (np.concatenate(x) if len(parts) > 1 else x[0] for x in zip(*parts, strict=True))
-    return Trajectory(motion.t, closed.q, v, a, N, closed.residual)
+        _check_limits(chain, found.q, motion)
+    seal((found.q, found.v, found.a, found.N, found.gap))
+    return Trajectory(motion.t, found.q, found.v, found.a, found.N, found.gap)
+
+
+def _require_closed(loops: Loops, q: Array, gap: Array, tolerance: float) -> None:
+    """Raise where round-off leaves a sample further open than asked for."""
+    worst = int(np.argmax(gap))
+    if not closed_enough(loops, gap[worst], tolerance):
+        error = open_message(loops, residual_of(loops, q[worst, None])[0], "at these actuated coordinates")
+        error.sample = worst
+        raise error
 
 
 def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
     lower, upper = chain.model.lowerPositionLimit, chain.model.upperPositionLimit
-    bad = np.argwhere((q < lower - _SLACK) | (q > upper + _SLACK))
-    if bad.size:
-        k, i = (int(b) for b in bad[0])
+    outside = (q < lower - _SLACK) | (q > upper + _SLACK)
+    if outside.any():
+        k, i = (int(b) for b in np.argwhere(outside)[0])
         owner = int(np.searchsorted(np.array(chain.model.idx_qs)[1:], i, side="right"))
         raise InvalidInputError(
             f"joint {chain.model.names[owner]} at sample {k} (t = {motion.t[k]:.6g} s)",
