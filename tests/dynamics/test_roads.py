@@ -17,7 +17,7 @@ from fivebar_pin import JointSpring, Spring
 from fivebar_pin.cli import main
 from fivebar_pin.cli._moving import sway
 from fivebar_pin.dynamics import inverse
-from fivebar_pin.dynamics.by_complement import _CHUNK
+from fivebar_pin.dynamics.compiled_calls import CHUNK
 from fivebar_pin.dynamics.inverse import ROADS, roads_apart
 from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 
@@ -161,7 +161,7 @@ def path_of(samples: int) -> tuple[fb.ClosedChain, fb.Trajectory]:
 
 
 def test_threads_change_no_bit_of_a_long_trajectory():
-    chain, path = path_of(2 * _CHUNK + 17)
+    chain, path = path_of(2 * CHUNK + 17)
     force = {"left_body": np.sin(np.arange(6.0 * len(path))).reshape(-1, 6)}
     for road in ROADS:
         one, three = (
@@ -169,10 +169,10 @@ def test_threads_change_no_bit_of_a_long_trajectory():
         )
         for name in (*QUANTITIES, "tree_torque"):
             np.testing.assert_array_equal(getattr(one, name), getattr(three, name))
-    short = fb.Trajectory(*(getattr(path, name)[_CHUNK : _CHUNK + 3] for name in path.__slots__))
-    few = fb.inverse_dynamics(chain, short, road="complement", external={"left_body": force["left_body"][_CHUNK:][:3]})
+    short = fb.Trajectory(*(getattr(path, name)[CHUNK : CHUNK + 3] for name in path.__slots__))
+    few = fb.inverse_dynamics(chain, short, road="complement", external={"left_body": force["left_body"][CHUNK:][:3]})
     long = fb.inverse_dynamics(chain, path, road="complement", external=force)
-    np.testing.assert_array_equal(few.torque, long.torque[_CHUNK : _CHUNK + 3])
+    np.testing.assert_array_equal(few.torque, long.torque[CHUNK : CHUNK + 3])
 
 
 def test_few_samples_take_the_complement_and_many_take_pinocchio():
