@@ -44,7 +44,7 @@ from fivebar_pin.engine.tables import (
     X,
 )  # fmt: skip
 
-__all__ = ["combine", "factorise", "inverse_norm", "solve", "substitute"]
+__all__ = ["combine", "factorise", "inverse_norm", "solve", "substitute", "substitute_back"]
 
 _EXPLICIT = 4  # columns up to which the inverse is made
 _ITERATIONS = 2  # of inverse iteration, which is warm: blocks change little from one sample to the next
@@ -185,7 +185,7 @@ def substitute(I: Integers, W: Array, g: int) -> None:
 
 
 @compiled
-def _substitute_back(I: Integers, W: Array, g: int) -> None:
+def substitute_back(I: Integers, W: Array, g: int) -> None:
     """Solve A^T x = rhs of a factorised square block in place; of a tall one R^T x = rhs."""
     n, b, A, pivots = I[g + WIDTH], I[RHS], I[g + FACTORS], I[g + PIVOTS]
     _upper_back(W, A, n, b)
@@ -246,7 +246,7 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
         else:
             for i in range(n):
                 W[b + i] = W[weak + i] / W[I[SCALE] + I[columns + i]]
-            _substitute_back(I, W, g)
+            substitute_back(I, W, g)
             size = sqrt(_square(W, b, n))
             for i in range(n):
                 W[b + i] /= size

@@ -34,12 +34,17 @@ class Prepared:
         turns: which motors come back to the same pose after a whole turn, and which of these do not count turns (na,) each.
         left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they are
             [m, rad or -].
+        mixed: the rows of the engine as orthonormal combinations of those of the closures, both scaled (rows, m).
+        vanishing: the other combinations, which say nothing anywhere, each of rows of one sort of one closure (k, m).
     """
 
-    def __init__(self, vectors: tuple[Integers, Array], turns: tuple[Flags, Flags], left: float) -> None:
+    def __init__(
+        self, vectors: tuple[Integers, Array], turns: tuple[Flags, Flags], left: float, mixes: tuple[Array, Array]
+    ) -> None:
         (self.I, self.W), self.turns, self.left = vectors, turns, left
+        self.mixed, self.vanishing = mixes
         self.nq = int(self.I[NQ])
-        seal((*vectors, *turns))
+        seal((*vectors, *turns, *mixes))
         self._threads = threading.local()
 
     def memory(self) -> Array:
@@ -54,7 +59,8 @@ class Prepared:
 def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
     loops = loops_of(chain)
-    kept = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
+    found = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
+    kept = [(rows, J) for rows, J, _ in found]
     starts = np.cumsum([0, *(J.shape[1] for _, J in kept)])
     touched = [c.columns for c, (_, J) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
     systems = []
@@ -72,7 +78,7 @@ def prepared_of(chain: ClosedChain) -> Prepared:
         loops.column_scale,
         loops.length,
     )
-    return Prepared(layout_of(parts), _turns(chain, loops), loops.left)
+    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, _mixes(loops, [mixes for *_, mixes in found]))
 
 
 def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
@@ -84,33 +90,51 @@ def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
     return np.array(whole, dtype=np.bool_), np.array([loops.tree.is_cyclic(k) for k in motors], dtype=np.bool_)
 
 
-def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], Array]:
+def _mixes(loops: Loops, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Return the combinations of the rows of each closure as combinations of all rows: those kept, those that vanish."""
+    found = []
+    for some in zip(*parts, strict=True):
+        spread = np.zeros((sum(len(x) for x in some), loops.m))
+        start = 0
+        for c, mix in zip(loops.anchored, some, strict=True):
+            spread[start : start + len(mix), c.rows], start = mix, start + len(mix)
+        found.append(spread)
+    kept, vanishing = found if found else (np.zeros((0, 0)), np.zeros((0, 0)))
+    return kept, vanishing
+
+
+def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], Array, tuple[Array, Array]]:
     """Return the rows of a closure without those that say nothing anywhere, and their scaled Jacobian.
 
-    Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane.
+    Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane. The combinations
+    that are kept, and those that are not, come with them.
     """
     J, length = J * loops.column_scale[anchored.columns], loops.length
     if not isinstance(anchored, AnchoredFrames):
-        return (), J * anchored.row_scale(length, loops.column_scale)[:, None]
+        whole = np.eye(J.shape[1])
+        return (), J * anchored.row_scale(length, loops.column_scale)[:, None], (whole, whole[:0])
     rows = anchored.closure.rows
     kept: list[Row] = []
     scaled: list[Array] = []
+    mixes: tuple[list[Array], list[Array]] = [], []
     for sort in dict.fromkeys((row.sort, row.other.tobytes()) for row in rows):
         some = [k for k, row in enumerate(rows) if (row.sort, row.other.tobytes()) == sort]
         mine = J[:, some] * (1.0 / length if sort[0] in ("along", "length") else 1.0)
         U, s, _ = np.linalg.svd(np.concatenate(list(mine), axis=1), full_matrices=False)
-        r = int(ranks_of(s))
+        r, places = int(ranks_of(s)), np.eye(len(rows))[some]
         mix = np.eye(len(some)) if r == len(some) else U[:, :r].T
         kept += [rows[k] for k in some] if r == len(some) else joined_rows([rows[k] for k in some], mix)
         scaled.append(np.matmul(mix, mine))
-    return tuple(kept), np.concatenate(scaled, axis=1)
+        for some_mixes, mixed in zip(mixes, (mix, np.linalg.svd(mix)[2][r:]), strict=True):
+            some_mixes.append(mixed @ places)
+    return tuple(kept), np.concatenate(scaled, axis=1), (np.concatenate(mixes[0]), np.concatenate(mixes[1]))
 
 
 def _spread(J: Array, columns: Index, nv: int) -> Array:
     """Return rows of a closure at all samples side by side, in all columns (rows, n nv)."""
     whole = np.zeros((J.shape[1], J.shape[0], nv))
     whole[:, :, columns] = np.swapaxes(J, 0, 1)
-    return whole.reshape(J.shape[1], -1)
+    return whole.reshape(J.shape[1], J.shape[0] * nv)
 
 
 def _combinations(wide: Array) -> Array | None:
