@@ -99,7 +99,7 @@ class Reactions(Immutable):
     def bodies(self) -> BodyRates:
         """Momenta of the bodies and their rates."""
         tree, path = loops_of(self.chain).tree, self.trajectory
-        rates = tree.rates(path.q, path.v, self._poses)
+        rates = tree.rates(path.q, path.v)
         return body_rates(tree, Bodies.of(self.chain), self._poses, rates, path.a)
 
     @lazy
