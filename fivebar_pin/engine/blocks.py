@@ -11,7 +11,7 @@ A = H_1 ... H_n R, H = 1 - w w^T; the others stand below the diagonal.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.compiled import compiled
@@ -263,7 +263,7 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
         size = _square(W, b, n)
         most = most + size if explicit else size
         for i in range(n):
-            W[weak + i] = W[b + i] / sqrt(size)
+            W[weak + i] = W[b + i] / sqrt(size) if size < inf else 1.0  # a singular block is not remembered
     return sqrt(most)
 
 

@@ -183,7 +183,7 @@ def test_a_mechanism_that_lies_flat_is_singular_but_for_round_off():
 @pytest.mark.parametrize("n", [5, 6, 9])
 @pytest.mark.parametrize("weakest", [1e-1, 1e-3, 1e-6])
 def test_the_weakest_direction_is_found_wherever_it_lies(n, weakest):
-    """Orthogonal to where the iteration starts, and to the direction that was weakest before: symmetric mechanisms do so.
+    """Orthogonal to where the iteration starts, or to what was weakest before, as in symmetric mechanisms.
 
     Each column of V is the weakest in turn, the first after the start (1, ..., 1) in the units of the columns.
     """

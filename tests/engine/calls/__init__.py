@@ -131,3 +131,15 @@ def attempt(I, W, tangent):
     if closed:
         following._certify(I, W, False)
     return closed, W[I[CLOSED]] == 1.0
+
+
+@entry
+def contraction(I, W, g, beta):
+    """Return the largest β_s K η of a block along the chord."""
+    return following._contraction(I, W, g, beta)
+
+
+@entry
+def weights(h, h1, h2):
+    """Return the weights of N at this point and at the two before."""
+    return following._weights(h, h1, h2)
