@@ -25,7 +25,7 @@ CHOSEN = (
 def test_uncompiled_the_kernels_pass_the_same_tests():
     """Some of those of this folder, in a process that does not compile; warnings of NumPy are errors there."""
     words = f"({' or '.join(f'({chosen})' for chosen in CHOSEN)}) and not inf"
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", str(HERE), "-k", words]
+    command = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", str(HERE), "-k", words]
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=HERE.parents[1])
     assert done.returncode == 0, done.stdout + done.stderr
