@@ -14,11 +14,10 @@ import calls
 import numpy as np
 import pinocchio as pin
 from mechanisms import add, at, body, close_at, point
-from sampled import Sampled
+from sampled import Driven, Sampled
 
 import fivebar_pin as fb
 from fivebar_pin.closures import Coupling, Cylindrical, Distance
-from fivebar_pin.engine import entries
 from fivebar_pin.engine import tables as e
 from fivebar_pin.errors import FiveBarPinError
 from fivebar_pin.mechanism.loops import loops_of
@@ -215,10 +214,8 @@ def finely(s: Sampled, q: np.ndarray, x0: np.ndarray, x1: np.ndarray, parts: int
     """Follow the straight line in so many parts and return whether it was followed, and to where."""
     X = x0 + np.linspace(0.0, 1.0, parts + 1)[:, None] * (x1 - x0)
     X[-1] = x1
-    Q = np.empty((len(X), q.size))
-    Q[0] = q
-    done = entries.reach(s.I, np.array(s.W), X, Q)
-    return done == len(X), Q[-1]
+    found = Driven(s.chain, X, q)
+    return found.done == len(X), found.q[-1]
 
 
 def apart(s: Sampled, q0: np.ndarray, q1: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""The sample at hand of a chain: written and read by name, for tests."""
+"""The sample at hand of a chain, written and read by name, and samples one after the other; for tests."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import calls
 import numpy as np
 
 import fivebar_pin as fb
+from fivebar_pin._arrays import frozen
+from fivebar_pin.engine import entries
 from fivebar_pin.engine import tables as e
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.prepared import prepared_of
@@ -87,3 +89,20 @@ class Sampled:
     def close(self, q: np.ndarray) -> bool:
         self.set(q=q)
         return bool(calls.close(self.I, self.W))
+
+
+class Driven:
+    """A motion of the motors (n, na), followed by `entries.drive` from q0; memory may be that of another drive."""
+
+    def __init__(self, chain: fb.ClosedChain, x, q0, *, v=None, a=None, W=None) -> None:
+        s, x = Sampled(chain), frozen(np.atleast_2d(np.asarray(x, dtype=float)))
+        self.W = s.W if W is None else W
+        n, nv, still = len(x), chain.nv, np.zeros_like(x)
+        self.q, self.v, self.a = np.full((n, chain.nq), np.nan), np.full((n, nv), np.nan), np.full((n, nv), np.nan)
+        self.N, self.gap = np.full((n, nv, chain.na), np.nan), np.full(n, np.nan)
+        self.q[0] = q0
+        rates = [frozen(still if y is None else y) for y in (v, a)]
+        out = self.q, self.v, self.a, self.N, self.gap
+        self.done = entries.drive(s.I, self.W, x, *rates, *out)
+        self.status = int(self.W[s.I[e.STATUS]])
+        self.here = np.array(self.W[s.I[e.Q_HERE] :][: chain.nq])

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from certificates import FAMILIES, Found, judge, prepared
 from mechanisms import bennett, five_bar, four_bar, parallelogram, rssr, slider_crank
-from sampled import Sampled
+from sampled import Driven, Sampled
 from test_newton import every_mechanism
 
 import fivebar_pin as fb
-from fivebar_pin.engine import entries
 from fivebar_pin.engine import tables as e
 from fivebar_pin.engine.following import BLOCKED, FOLLOWED, TOGETHER
 from fivebar_pin.mechanism.complement import complement_of, rates_of
@@ -21,23 +20,6 @@ from fivebar_pin.mechanism.loops import loops_of
 
 ROUND_OFF = 1e-11
 """Difference of two roads to one regular configuration [rad, or chain lengths]."""
-
-
-class Driven:
-    """A motion of the motors (n, na), followed by `entries.drive` from q0; memory may be that of another drive."""
-
-    def __init__(self, chain: fb.ClosedChain, x, q0, *, v=None, a=None, W=None) -> None:
-        s, x = Sampled(chain), np.atleast_2d(np.asarray(x, dtype=float))
-        self.W = s.W if W is None else W
-        n, nv, still = len(x), chain.nv, np.zeros_like(x)
-        self.q, self.v, self.a = np.full((n, chain.nq), np.nan), np.full((n, nv), np.nan), np.full((n, nv), np.nan)
-        self.N, self.gap = np.full((n, nv, chain.na), np.nan), np.full(n, np.nan)
-        self.q[0] = q0
-        rates = [np.ascontiguousarray(still if y is None else y) for y in (v, a)]
-        out = self.q, self.v, self.a, self.N, self.gap
-        self.done = entries.drive(s.I, self.W, x, *rates, *out)
-        self.status = int(self.W[s.I[e.STATUS]])
-        self.here = np.array(self.W[s.I[e.Q_HERE] :][: chain.nq])
 
 
 def lines(*corners, parts=1) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mechanisms import five_bar, four_bar
-from test_following import Driven
+from sampled import Driven
 
 from fivebar_pin.engine.following import BLOCKED, FOLLOWED
 

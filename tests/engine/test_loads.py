@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import at, point
-from sampled import Sampled
-from test_following import Driven, swing
+from sampled import Driven, Sampled
+from test_following import swing
 from test_links import JOINTS, close_to, states, tree_with
 from test_newton import every_mechanism, shipped
 

@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from mechanisms import five_bar
-from test_following import Driven, swing
+from sampled import Driven
+from test_following import swing
 from test_newton import shipped
 
 import fivebar_pin as fb
