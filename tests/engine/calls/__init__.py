@@ -1,0 +1,83 @@
+"""Kernels of the engine as Python calls them in tests: each does one thing to the sample at hand.
+
+They stand in a folder of their own because machine code is kept for as long as the files beside it stay the same.
+"""
+
+from __future__ import annotations
+
+from fivebar_pin.engine import blocks, closing, following, rows
+from fivebar_pin.engine import tree as trees
+from fivebar_pin.engine.bodies import reduced_inertia, twists
+from fivebar_pin.engine.compiled import entry
+from fivebar_pin.engine.tables import CLOSED
+
+
+@entry
+def tree(I, W):
+    """Write poses, velocities and accelerations of all links."""
+    trees.place(I, W)
+    trees.move(I, W)
+    trees.accelerate(I, W)
+
+
+@entry
+def integrate(I, W, x):
+    """Move q along the tangent that stands from W[x] on."""
+    trees.integrate(I, W, x)
+
+
+@entry
+def closures(I, W):
+    """Write residuals, Jacobian and, as leads, the drift of all rows."""
+    trees.place(I, W)
+    rows.look(I, W)
+    rows.jacobian(I, W)
+    trees.move(I, W)
+    trees.accelerate(I, W)
+    rows.drifts(I, W)
+
+
+@entry
+def factorise(I, W):
+    """Factorise all blocks and tell whether none is singular."""
+    return blocks.factorise(I, W)
+
+
+@entry
+def solve(I, W):
+    """Solve J x = lead for the passive part of x."""
+    blocks.solve(I, W)
+
+
+@entry
+def inverse_norm(I, W, g):
+    """Return the size of the inverse of the block whose record begins at g."""
+    return blocks.inverse_norm(I, W, g)
+
+
+@entry
+def close(I, W):
+    """Close q by its passive coordinates and tell whether it is closed."""
+    closing.close(I, W)
+    return W[I[CLOSED]] == 1.0
+
+
+@entry
+def advance(I, W, first):
+    """Go on along the straight line to `TO`."""
+    following.advance(I, W, first)
+
+
+@entry
+def certify(I, W):
+    """Tell whether this point and the one before are on one branch."""
+    W[I[CLOSED]] = 1.0
+    following._certify(I, W, False)
+    return W[I[CLOSED]] == 1.0
+
+
+@entry
+def mass_matrix(I, W, M):
+    """Write the reduced inertia M (na, na) of the poses and the complement that stand there."""
+    twists(I, W)
+    reduced_inertia(I, W, M)
