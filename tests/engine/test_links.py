@@ -145,7 +145,7 @@ def test_every_column_is_the_motion_of_its_coordinate(joint, base):
 @every_joint
 @pytest.mark.parametrize("size", [1e-9, 1e-5, 9e-5, 1.1e-4, 1e-2, 1.0, 3.0])
 def test_integration_equals_pinocchio(joint, size):
-    """Steps on either side of where series take over; Pinocchio's in four parts, of which none turns a quaternion over."""
+    """On either side of where series take over; Pinocchio's in four parts, of which none turns a quaternion over."""
     chain = tree_with(joint)
     s, model = Sampled(chain), chain.model
     for q, v, _ in states(model, 2):
@@ -195,7 +195,7 @@ def test_loads_of_a_tree_are_those_of_pinocchio(joint, base):
 def test_a_joint_that_moves_its_own_axes_is_refused_by_name():
     model = pin.Model()
     model.addJoint(0, pin.JointModelEllipsoid(0.3, 0.4, 0.5), at(), "egg")
-    with pytest.raises(InvalidInputError, match="JointModelEllipsoid.* is not known"):
+    with pytest.raises(InvalidInputError, match=r"JointModelEllipsoid.* is not known"):
         links_of(model)
 
 

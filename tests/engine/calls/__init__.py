@@ -9,7 +9,7 @@ from fivebar_pin.engine import blocks, closing, following, rows
 from fivebar_pin.engine import tree as trees
 from fivebar_pin.engine.bodies import reduced_inertia, twists
 from fivebar_pin.engine.compiled import entry
-from fivebar_pin.engine.tables import CLOSED
+from fivebar_pin.engine.tables import CLOSED, GOING
 
 
 @entry
@@ -81,3 +81,24 @@ def mass_matrix(I, W, M):
     """Write the reduced inertia M (na, na) of the poses and the complement that stand there."""
     twists(I, W)
     reduced_inertia(I, W, M)
+
+
+@entry
+def step(I, W):
+    """Take one step of Newton and return the largest residuals before and after it."""
+    trees.place(I, W)
+    rows.look(I, W)
+    rows.jacobian(I, W)
+    blocks.factorise(I, W)
+    before = closing.largest_residual(I, W)
+    W[I[GOING]] = 1.0
+    closing._step(I, W)
+    trees.place(I, W)
+    rows.look(I, W)
+    return before, closing.largest_residual(I, W)
+
+
+@entry
+def largest(I, W):
+    """Return the largest residual that stands there."""
+    return closing.largest_residual(I, W)
