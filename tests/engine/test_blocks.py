@@ -153,15 +153,15 @@ def test_inverses_of_small_blocks_have_their_frobenius_norm(shape):
 
 @pytest.mark.parametrize("shape", [x for x in SHAPES if x not in SQUARE[:4]], ids=str)
 def test_inverses_of_large_blocks_come_to_have_their_largest_singular_value(shape):
-    """From below where they are not small either, and there after a few samples."""
+    """Never more, and nearly as much after a few samples; those that come out small and square have Frobenius' norm."""
     system = System(shape)
     assert system.factorise()
     exact = np.linalg.norm(np.linalg.pinv(system.A * system.scale[: system.n]), 2)
     norms = [system.norm() for _ in range(100)]
     if (shape[2], shape[1]) not in [(n, n) for n in range(5)]:
         assert norms[0] <= exact * (1.0 + 1e-12) and norms[0] >= 0.2 * exact
-        assert np.all(np.diff(norms) >= -1e-12 * exact)
-        np.testing.assert_allclose(norms[-1], exact, rtol=1e-6)
+        assert max(norms) <= exact * (1.0 + 1e-12)
+        np.testing.assert_allclose(norms[-1], exact, rtol=0.02)
     else:
         np.testing.assert_allclose(norms, np.linalg.norm(np.linalg.inv(system.A * system.scale[: system.n])))
 
@@ -178,3 +178,27 @@ def test_a_mechanism_that_lies_flat_is_singular_but_for_round_off():
     s = Sampled(chain).set(q=np.zeros(chain.nq))
     calls.closures(s.I, s.W)
     assert not calls.factorise(s.I, s.W) or calls.inverse_norm(s.I, s.W, s.blocks[0]) > 1e12
+
+
+@pytest.mark.parametrize("n", [5, 6, 9])
+@pytest.mark.parametrize("weakest", [1e-1, 1e-3, 1e-6])
+def test_the_weakest_direction_is_found_wherever_it_lies(n, weakest):
+    """Orthogonal to where the iteration starts, and to the direction that was weakest before: symmetric mechanisms do so.
+
+    Each column of V is the weakest in turn, the first after the start (1, ..., 1) in the units of the columns.
+    """
+    system = System((n, n, n))
+    scale = system.scale[:n]
+    U, V = (np.linalg.qr(system.rng.normal(size=(n, n)))[0] for _ in range(2))
+    V = np.linalg.qr(np.column_stack([1.0 / scale, V[:, 1:]]))[0]
+    s, J = system.s, system.s.J
+    for k in (1, 2, 1, 0, n - 1):
+        sigma = np.ones(n)
+        sigma[k] = weakest
+        J[:, :n] = U @ np.diag(sigma) @ V.T / scale
+        system.overwrite(J)
+        for _ in range(3):
+            assert system.factorise()
+            norm = system.norm()
+        np.testing.assert_allclose(norm, 1.0 / weakest, rtol=0.02)
+    assert s.of(system.g, e.HEIGHT) == n
