@@ -9,7 +9,23 @@ from fivebar_pin.engine import blocks, closing, following, rows
 from fivebar_pin.engine import tree as trees
 from fivebar_pin.engine.bodies import reduced_inertia, twists
 from fivebar_pin.engine.compiled import entry
-from fivebar_pin.engine.tables import CLOSED, GOING
+from fivebar_pin.engine.tables import (
+    CLOSED,
+    COLUMN_SIZE,
+    COLUMNS,
+    GOING,
+    J_BEFORE,
+    J_HERE,
+    MOTORS,
+    MOVED,
+    NA,
+    NV,
+    Q_BEFORE,
+    Q_HERE,
+    SIGNS,
+    SIGNS_BEFORE,
+    TO,
+)
 
 
 @entry
@@ -69,14 +85,6 @@ def advance(I, W, first):
 
 
 @entry
-def certify(I, W):
-    """Tell whether this point and the one before are on one branch."""
-    W[I[CLOSED]] = 1.0
-    following._certify(I, W, False)
-    return W[I[CLOSED]] == 1.0
-
-
-@entry
 def mass_matrix(I, W, M):
     """Write the reduced inertia M (na, na) of the poses and the complement that stand there."""
     twists(I, W)
@@ -102,3 +110,24 @@ def step(I, W):
 def largest(I, W):
     """Return the largest residual that stands there."""
     return closing.largest_residual(I, W)
+
+
+@entry
+def attempt(I, W, tangent):
+    """Take one step from a point of the branch, along any tangent (nv,), the motors to `TO`, as `advance` would.
+
+    Returns:
+        Whether it closed, and whether that is certified to be the same branch.
+    """
+    following._copy_state(I, W, I[Q_HERE], I[Q_BEFORE], I[J_HERE], I[J_BEFORE], I[SIGNS], I[SIGNS_BEFORE])
+    W[I[CLOSED]] = 1.0
+    for k in range(I[NV]):
+        W[I[MOVED] + k] = tangent[k]
+    trees.integrate(I, W, I[MOVED])
+    for a in range(I[NA]):
+        trees.set_coordinate(I, W, I[COLUMNS] + COLUMN_SIZE * I[I[MOTORS] + a], W[I[TO] + a])
+    closing.close(I, W)
+    closed = W[I[CLOSED]] == 1.0
+    if closed:
+        following._certify(I, W, False)
+    return closed, W[I[CLOSED]] == 1.0
