@@ -176,15 +176,19 @@ def prepared(family: str, rng: np.random.Generator) -> tuple[Sampled, np.ndarray
     return (s, s.q) if max(norms) < 1.0 / _REGULAR else None
 
 
-def step(s: Sampled, q: np.ndarray, rng: np.random.Generator, found: Found) -> None:
-    """Take one step of any size from q, by the tangent or astray from it, and judge it where it is certified."""
+def step(s: Sampled, q: np.ndarray, rng: np.random.Generator, found: Found) -> bool:
+    """Take one step of any size from q, by the tangent or astray from it, and judge it where it is certified.
+
+    Returns:
+        Whether it closed.
+    """
     chain, loops = s.chain, loops_of(s.chain)
     x0 = loops.actuated_of(q[None])[0]
     s.numbers(e.TO, chain.na)[:] = x0
     s.set(q)
     calls.advance(s.I, s.W, True)
     if s.numbers(e.STATUS, 1)[0] != 0.0:
-        return
+        return False
     size = np.exp(rng.uniform(np.log(1e-2), np.log(2.0)))
     way = rng.normal(size=chain.na) * loops.column_scale[chain.actuated_index]
     x1 = x0 + size * way / max(1.0, np.abs(way / loops.column_scale[chain.actuated_index]).max())
@@ -208,6 +212,7 @@ def step(s: Sampled, q: np.ndarray, rng: np.random.Generator, found: Found) -> N
             arrived, at_end = finely(s, q, x0, x1, 50 * FINE)
             if not arrived or apart(s, s.q, at_end) > SAME:
                 found.wrong.append(f"arrived {arrived}, moved {moved:.3g}, {chain}")
+    return bool(closed)
 
 
 def finely(s: Sampled, q: np.ndarray, x0: np.ndarray, x1: np.ndarray, parts: int) -> tuple[bool, np.ndarray]:

@@ -19,7 +19,7 @@ def coupled(ratios: np.ndarray, motors: int) -> fb.ClosedChain:
     names = [f"x{k}" for k in range(ratios.shape[1])]
     for k, name in enumerate(names):
         joint = pin.JointModelPX() if k % 3 == 2 else pin.JointModelRZ()
-        add(model, 0, joint, at(0.2 * k, 0.3 * (k % 2), 0.1), name, body(k))
+        add(model, 0, joint, at(2.0 * k, 0.3 * (k % 2), 0.1), name, body(k))
     rows = [
         Coupling({name: c for name, c in zip(names, row, strict=True) if c != 0.0}, name=f"row{i}")
         for i, row in enumerate(ratios)

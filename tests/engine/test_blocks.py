@@ -130,6 +130,39 @@ def test_columns_that_vanish_or_are_no_numbers_are_singular(shape):
         assert system.sign() == 0.0
 
 
+@pytest.mark.parametrize("shape", TALL, ids=str)
+def test_a_column_that_is_nearly_reflected_already_loses_no_digit(shape):
+    """The reflection goes to the far side: (1, 1e-9, ...) to -1, never to 1."""
+    for tail in (1e-9, 0.0):
+        for head in (1.0, -1.0):
+            system = System(shape)
+            J = system.s.J
+            J[:, 0] = [head, *(tail * np.arange(1.0, shape[0]))]
+            system.overwrite(J)
+            x = system.rng.normal(size=system.n + 3)
+            assert system.factorise()
+            found = system.solve(J @ x, x[system.n :])
+            np.testing.assert_allclose(found, x[: system.n], rtol=0.0, atol=1e-13 * np.linalg.cond(system.A))
+
+
+@pytest.mark.parametrize("shape", [(5, 5, 5), (9, 9, 9)], ids=str)
+def test_a_block_too_singular_for_numbers_is_forgotten(shape):
+    """Its inverse overflows; the next regular one is told as if it had not been there."""
+    system = System(shape)
+    J = system.s.J
+    assert system.factorise()
+    norm = system.norm()
+    tiny = np.array(J)
+    tiny[:, 0] *= 1e-200
+    with np.errstate(all="ignore"):
+        system.overwrite(tiny)
+        assert system.factorise()
+        assert not system.norm() < 1e100
+    system.overwrite(J)
+    assert system.factorise()
+    np.testing.assert_allclose(system.norm(), norm, rtol=0.3)
+
+
 def test_one_singular_block_among_regular_ones_is_told():
     """Whichever of the three it is."""
     s = Sampled(coupled(np.array([[1.0, 0, 0, 2], [0, 3, 0, 1], [0, 0, 2, 1]]), 1))

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import calls
 import numpy as np
+import pinocchio as pin
 import pytest
 from mechanisms import (
     TILTED,
+    add,
+    at,
     bennett,
+    body,
     five_bar,
     four_bar,
     parallelogram,
@@ -22,6 +26,7 @@ from test_links import FAR
 from tied_chains import EXAMPLES
 
 import fivebar_pin as fb
+from fivebar_pin.closures import Coupling
 from fivebar_pin.engine import closing
 from fivebar_pin.engine import tables as e
 from fivebar_pin.mechanism.loops import loops_of
@@ -176,3 +181,16 @@ def test_the_residual_that_is_told_is_the_largest_and_never_passes_over_what_is_
             assert calls.largest(s.I, s.W) == np.inf
         s.W[s.of(r, e.RESIDUAL)] = -1e3 - k
         assert calls.largest(s.I, s.W) == 1e3 + k
+
+
+def test_a_slide_of_a_large_chain_may_be_corrected_by_metres():
+    """Steps count in lengths of the chain: here a rack of some 100 m is 1 m off."""
+    model = pin.Model()
+    add(model, 0, pin.JointModelRZ(), at(), "pinion", body(1))
+    add(model, 0, pin.JointModelPX(), at(100.0, 50.0), "rack", body(2))
+    chain = fb.ClosedChain(model, (Coupling({"rack": 1.0, "pinion": 50.0}),), ("pinion",))
+    s = Sampled(chain)
+    assert chain.length > 50.0
+    assert s.close(np.array([0.3, -14.0]))
+    np.testing.assert_allclose(s.q, [0.3, -15.0], rtol=1e-15)
+    assert not s.close(np.array([0.3, 1e4]))

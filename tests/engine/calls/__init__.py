@@ -134,6 +134,14 @@ def attempt(I, W, tangent):
 
 
 @entry
+def certify(I, W):
+    """Tell whether this point and the one before, as they stand there, are certified to be on one branch."""
+    W[I[CLOSED]] = 1.0
+    following._certify(I, W, False)
+    return W[I[CLOSED]] == 1.0
+
+
+@entry
 def contraction(I, W, g, beta):
     """Return the largest β_s K η of a block along the chord."""
     return following._contraction(I, W, g, beta)
