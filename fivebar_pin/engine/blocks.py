@@ -44,7 +44,7 @@ from fivebar_pin.engine.tables import (
     X,
 )  # fmt: skip
 
-__all__ = ["combine", "factorise", "inverse_norm", "solve", "substitute", "substitute_back"]
+__all__ = ["combine", "factorise", "inverse_norm", "least_pivot", "solve", "substitute", "substitute_back"]
 
 _EXPLICIT = 4  # columns up to which the inverse is made
 _ITERATIONS = 2  # of inverse iteration, which is warm: blocks change little from one sample to the next
@@ -265,6 +265,19 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
         for i in range(n):
             W[weak + i] = W[b + i] / sqrt(size) if size < inf else 1.0  # a singular block is not remembered
     return sqrt(most)
+
+
+@compiled
+def least_pivot(I: Integers, W: Array) -> float:
+    """Return the least pivot of all factors, scaled; zero where one is not a number."""
+    least = inf
+    for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
+        n = I[g + WIDTH]
+        for k in range(n):
+            size = abs(W[I[g + FACTORS] + k * n + k]) * W[I[SCALE] + I[I[g + COLUMN_LIST] + k]]
+            if not size >= least:
+                least = size if size > 0.0 else 0.0
+    return least
 
 
 @compiled

@@ -38,7 +38,7 @@ from fivebar_pin.engine.tables import (
 from fivebar_pin.engine.tree import accelerate, move, place
 from fivebar_pin.engine.vectors import Vector
 
-__all__ = ["drive", "loads", "need", "read", "residual", "set_out"]
+__all__ = ["drive", "loads", "need", "open_by", "read", "residual", "set_out"]
 
 
 @entry

@@ -9,10 +9,10 @@ what the motors give, and nothing in the passive ones.
 
 from __future__ import annotations
 
-from math import inf, nan
+from math import nan
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.engine.blocks import factorise, substitute_back
+from fivebar_pin.engine.blocks import factorise, least_pivot, substitute_back
 from fivebar_pin.engine.bodies import joint_forces
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.entries import need, read, set_out
@@ -32,7 +32,6 @@ from fivebar_pin.engine.tables import (
     ENTRY0,
     ENTRY0_END,
     ENTRY_SIZE,
-    FACTORS,
     FORCE,
     FRAMES,
     JACOBIAN0,
@@ -62,7 +61,6 @@ from fivebar_pin.engine.tables import (
     ROW_SIZE,
     ROWS,
     ROWS_END,
-    SCALE,
     SECOND_FRAME,
     SHAKING,
     TIES,
@@ -124,7 +122,7 @@ def reactions(
         look(I, W)
         jacobian(I, W)
         regular = factorise(I, W)
-        weakest[i] = _least_pivot(I, W) if regular else 0.0
+        weakest[i] = least_pivot(I, W) if regular else 0.0
         lost = need(I, W, _NOTHING, links, points, wrenches, i)
         joint_forces(I, W)
         for b in range(bodies.shape[0]):
@@ -145,19 +143,6 @@ def reactions(
             set_out(W, I[JOINT], left, i, 0, I[NV])
         i += 1
     return lost
-
-
-@compiled
-def _least_pivot(I: Integers, W: Array) -> float:
-    """Return the least pivot of all factors, scaled; zero where one is not a number."""
-    least = inf
-    for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
-        n = I[g + WIDTH]
-        for k in range(n):
-            size = abs(W[I[g + FACTORS] + k * n + k]) * W[I[SCALE] + I[I[g + COLUMN_LIST] + k]]
-            if not size >= least:
-                least = size if size > 0.0 else 0.0
-    return least
 
 
 @compiled
