@@ -217,6 +217,13 @@ def test_nothing_is_left_of_another_drive(make):
             np.testing.assert_array_equal(getattr(again, name), getattr(clean, name))
 
 
+def test_the_last_steps_are_kept_for_the_next_prediction():
+    chain = five_bar()
+    d = Driven(chain, [[2.0, 1.0], [2.03, 1.04], [2.036, 1.048], [2.036, 1.06]], fb.assemble(chain, [2.0, 1.0]))
+    I = Sampled(chain).I
+    np.testing.assert_allclose(d.W[I[[e.LAST_STEP, e.SECOND_STEP]]], [0.012, 0.01], rtol=1e-12)
+
+
 def test_predictions_are_integrals_of_parabolas():
     """h (w_0 N(0) + w_1 N(-h_1) + w_2 N(-h_1 - h_2)) is the integral of N from 0 to h, as far as steps are even."""
     rng = np.random.default_rng(0)
