@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.engine.tables import Q_HERE, STATUS
+from fivebar_pin.engine.tables import NQ, Q_HERE, STATUS, Integers
 from fivebar_pin.engine.threads import each
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.mechanism.closing import closed_enough, residual_of, search
@@ -22,7 +22,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
 from fivebar_pin.mechanism.prepared import Prepared
 
-__all__ = ["Followed", "follow", "reach", "singular"]
+__all__ = ["Followed", "blocked", "follow", "reach", "singular"]
 
 
 _CHUNK = 4096  # samples that are followed one after the other
@@ -126,7 +126,7 @@ class _Chunk:
         out.q[0] = begun
         done = drive(I, W, *self._motion, out.q, out.v, out.a, out.N, out.gap)
         if done < len(out.q):
-            self.error = _blocked(self._loops, self._ready, self._motion[0][done], done)
+            self.error = blocked(self._loops, I, W, self._motion[0][done] if done else None)
             _at(self.error, self._first + done)
         elif len(self._line) > 1:
             ends, self.error = _reach(self._loops, self._ready, out.q[-1], self._line)
@@ -142,7 +142,9 @@ def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, B
     q = np.full((X.shape[0], q0.size), np.nan)
     q[0] = q0
     done = reach(ready.I, ready.memory(), X, q)
-    return q, _at(_blocked(loops, ready, X[done], done), done) if done < X.shape[0] else None
+    if done == X.shape[0]:
+        return q, None
+    return q, _at(blocked(loops, ready.I, ready.memory(), X[done] if done else None), done)
 
 
 def _require_near(loops: Loops, X: Array) -> None:
@@ -166,10 +168,9 @@ def _one(loops: Loops, q: Array, other: Array) -> bool:
     return bool(np.abs(away).max(initial=0.0) <= _SAME)
 
 
-def _blocked(loops: Loops, ready: Prepared, x: Array, done: int) -> Blocked:
-    """Say why there is no way on from where this thread's memory is: the motors, x out of reach, or a singularity."""
-    I, W = ready.I, ready.memory()
-    q = np.array(W[I[Q_HERE] : I[Q_HERE] + ready.nq][None])
+def blocked(loops: Loops, I: Integers, W: Array, x: Array | None) -> Blocked:
+    """Say why there is no way on from q in W to x (na,), or none at all: the motors, out of reach, or a singularity."""
+    q = np.array(W[I[Q_HERE] : I[Q_HERE] + I[NQ]][None])
     here = Configurations(loops, np.array(q))
     if W[I[STATUS]] == _TOGETHER:
         try:
@@ -177,7 +178,7 @@ def _blocked(loops: Loops, ready: Prepared, x: Array, done: int) -> Blocked:
         except InvalidInputError as error:
             return error
     sigma = float(here.passive.sigma[0])
-    if done:
+    if x is not None:
         loops.set_actuated(q, x)
         residual = residual_of(loops, search(loops, q))[0]
         if not closed_enough(loops, np.abs(residual).max(initial=0.0), _OUT_OF_REACH):
