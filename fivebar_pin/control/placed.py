@@ -9,7 +9,6 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, find_frame
-from fivebar_pin.engine import single
 from fivebar_pin.engine.tables import Integers
 from fivebar_pin.kinematics import FrameMotion
 from fivebar_pin.mechanism.links import links_of
@@ -63,6 +62,8 @@ def frame_room(chain: ClosedChain, name: str) -> FrameRoom:
     Raises:
         UnknownNameError: there is no such frame.
     """
+    from fivebar_pin.engine import single
+
     link, R, p = _placed(chain, name)
     numbers = np.zeros(single.FRAME_SIZE)
     numbers[:9], numbers[9:12] = R.ravel(), p

@@ -134,6 +134,8 @@ def sample(I: Integers, W: Array, task: int, links: Integers, points: Array, wre
         velocities(I, W)
         accelerations(I, W)
         W[I[s + GAP]] = open_by(I, W)
+        for a in range(I[NA]):
+            W[I[TO_A] + a] = W[I[s + GIVEN] + a]
         if loaded:
             accelerate(I, W)
             twists(I, W)
@@ -173,7 +175,7 @@ def _begin(I: Integers, W: Array, s: int, task: int) -> None:
             W[I[TARGET] + a] += 2.0 * pi * floor(0.5 + turns)
             if not abs(W[I[TO] + a] - W[I[TARGET] + a]) <= FARTHEST * W[I[SCALE] + k]:
                 W[I[STATUS]] = TOO_FAR
-        W[I[TO_A] + a] = W[I[s + GIVEN] + a] if task == MOVE else 0.0
+        W[I[TO_A] + a] = 0.0
         W[I[TAU] + a], W[I[s + BIAS] + a] = nan, nan
     for k in range(6):
         W[I[SHAKING] + k], W[I[s + FRAME] + k] = nan, nan
@@ -183,12 +185,13 @@ def _begin(I: Integers, W: Array, s: int, task: int) -> None:
 
 @compiled
 def _equations(I: Integers, W: Array, s: int, task: int) -> None:
-    """Write M_bar, b, and the accelerations of the motors: those that are given, or M_bar^-1 (tau - b)."""
+    """Write M_bar, b, and in forward dynamics the accelerations of the motors, M_bar^-1 (tau - b) for tau."""
     for a in range(I[NA]):
         W[I[s + BIAS] + a] = W[I[TAU] + a]
-        W[I[TO_A] + a] = W[I[s + GIVEN] + a] - (W[I[TAU] + a] if task == FORWARD else 0.0)
     reduced_inertia(I, W, I[s + INERTIA])
     if task == FORWARD:
+        for a in range(I[NA]):
+            W[I[TO_A] + a] -= W[I[s + BIAS] + a]
         _factorise(I, W, s)
         _substitute(I, W, s)
 
