@@ -271,8 +271,9 @@ def _end(I: Integers, W: Array, s: int, loaded: bool) -> None:
     if W[I[STATUS]] == FOLLOWED and not size < inf:
         W[I[STATUS]] = BEYOND
     if W[I[STATUS]] == FOLLOWED:
-        for k in range(I[s + BEFORE] - I[CONSTANTS]):
-            W[I[s + BEFORE] + k] = W[I[CONSTANTS] + k]
+        here, before = I[CONSTANTS], I[s + BEFORE]
+        for k in range(before - here):
+            W[np.uint64(before + k)] = W[np.uint64(here + k)]  # places without a sign: several at once
 
 
 @entry
