@@ -44,7 +44,7 @@ class Evaluator:
         q, v, a: of all joints (nq,), (nv,), (nv,).
         N: complement, v = N v_actuated (nv, na).
         residual: largest of the closures () [m or rad].
-        a_actuated: accelerations of the actuated joints (na,) [rad/s2 or m/s2].
+        q_actuated, v_actuated, a_actuated: of the actuated joints (na,), order of `chain.actuated`.
         torque: of the actuated joints (na,) [N m or N].
         mass_matrix, bias: M_bar (na, na) and b (na,) of M_bar a_actuated + b = torque; forces from outside are in b.
         shaking_force, shaking_moment: -dp/dt and -dH/dt about the point `about` (3,) [N, N m].
@@ -53,8 +53,8 @@ class Evaluator:
 
     __slots__ = (
         "N", "_I", "_W", "_engine", "_frames", "_lock", "_now", "_pushes", "_q", "_shape", "_then", "_third", "_v",
-        "_x", "a", "a_actuated", "bias", "chain", "frame_force", "frame_moment", "mass_matrix", "q", "residual",
-        "shaking_force", "shaking_moment", "torque", "v",
+        "_x", "a", "a_actuated", "bias", "chain", "frame_force", "frame_moment", "mass_matrix", "q", "q_actuated",
+        "residual", "shaking_force", "shaking_moment", "torque", "v", "v_actuated",
     )  # fmt: skip
 
     chain: ClosedChain
@@ -63,6 +63,8 @@ class Evaluator:
     a: Array
     N: Array
     residual: Array
+    q_actuated: Array
+    v_actuated: Array
     a_actuated: Array
     torque: Array
     mass_matrix: Array
@@ -236,6 +238,9 @@ class Evaluator:
         try:
             self._q[:] = q
             self._compute(self._engine.STAND, self._pushes[()])
+        except BaseException:
+            self._now[:] = self._then
+            raise
         finally:
             self._lock.release()
 
@@ -243,7 +248,7 @@ class Evaluator:
         self, task: int, x: npt.ArrayLike, v: npt.ArrayLike, name: str, third: npt.ArrayLike,
         external: Mapping[str, npt.ArrayLike] | None,
     ) -> None:  # fmt: skip
-        """Write what is asked for into memory and compute."""
+        """Write what is asked for into memory and compute; where it cannot be done, go back."""
         shape = self._shape
         self._enter()
         try:
@@ -251,6 +256,9 @@ class Evaluator:
             self._v[:] = v if _plain(v, shape) else checked("v_actuated", v, shape)
             self._third[:] = third if _plain(third, shape) else checked(name, third, shape)
             self._compute(task, self._pushed(external) if external else self._pushes[()])
+        except BaseException:
+            self._now[:] = self._then
+            raise
         finally:
             self._lock.release()
 
@@ -266,14 +274,12 @@ class Evaluator:
         return pushes
 
     def _compute(self, task: int, pushes: Pushes) -> None:
-        """Do what is asked for; where it cannot be done, go back and say why."""
+        """Do what is asked for, or say why not."""
         status = self._engine.sample(self._I, self._W, task, pushes.links, pushes.points, pushes.wrenches)
         if status:
             from fivebar_pin.control.refusals import refusal
 
-            error = refusal(self.chain, self._I, self._W, status, task, pushes)
-            self._now[:] = self._then
-            raise error
+            raise refusal(self.chain, self._I, self._W, status, task, pushes)
 
 
 def _again(chain: ClosedChain, I: Integers, W: Array) -> Evaluator:

@@ -18,7 +18,7 @@ import fivebar_pin as fb
 from fivebar_pin import Evaluator, JointSpring, Spring, shipped
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError, SolverError, UnknownNameError
 
-RESULTS = ("q", "v", "a", "N", "a_actuated", "torque", "mass_matrix", "bias", "residual")
+RESULTS = ("q", "v", "a", "N", "q_actuated", "v_actuated", "a_actuated", "torque", "mass_matrix", "bias", "residual")
 WRENCHES = ("shaking_force", "shaking_moment", "frame_force", "frame_moment")
 ABOUT = (0.3, -0.2, 0.5)
 SAMPLES = 12
@@ -104,7 +104,9 @@ def test_kinematics_are_those_of_the_whole_motion(chain, q0):
         assert evaluator.kinematics(x, v, a) is evaluator.q
         for name, scale in sizes(path).items():
             close_to(getattr(evaluator, name), getattr(path, name)[i], scale)
-        np.testing.assert_array_equal(evaluator.a_actuated, a)
+        for have, want in ((evaluator.v_actuated, v), (evaluator.a_actuated, a)):
+            np.testing.assert_array_equal(have, want)
+        np.testing.assert_array_equal(np.exp(1j * evaluator.q_actuated), np.exp(1j * x))
         assert evaluator.residual <= 1e-12
         assert all(np.isnan(getattr(evaluator, name)).all() for name in ("torque", "mass_matrix", "bias", *WRENCHES))
 
@@ -267,6 +269,11 @@ REFUSED = {
         lambda e: e.kinematics(AT, RATE, [0.0, -np.inf]),
         InvalidInputError,
         r"a_actuated\[1\] = -inf",
+    ),
+    "too many of the last": (
+        lambda e: e.inverse(AT + 0.1, 2.0 * RATE, [0.0, 0.0, 0.0]),
+        InvalidInputError,
+        r"shape of a_actuated = \(3,\) but must be \(2,\)",
     ),
     "too few": (
         lambda e: e.inverse(AT[:1], RATE, RATE),
