@@ -416,6 +416,13 @@ def test_a_copy_goes_its_own_way_from_where_the_first_one_stands(make):
     assert_same(held(evaluator), held(other))
 
 
+def test_what_travelled_runs_the_code_that_is_compiled_already():
+    """Compiled code is for records that cannot be written, which NumPy forgets in a pickle: it would compile again."""
+    first, other = at_work(), pickle.loads(pickle.dumps(at_work()))
+    assert other._I.flags.writeable == first._I.flags.writeable
+    assert other._W.flags.writeable == first._W.flags.writeable
+
+
 def test_another_thread_is_refused_while_it_is_at_work():
     evaluator = at_work()
     with evaluator._lock:  # as one that computes holds it
