@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.chain import find_frame
 from fivebar_pin.closures.anchored import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
@@ -115,6 +117,23 @@ def blocks_of(
     return found
 
 
+class Described(Protocol):
+    """What is asked of a chain, see `ClosedChain`."""
+
+    @property
+    def model(self) -> pin.Model: ...
+    @property
+    def nq(self) -> int: ...
+    @property
+    def nv(self) -> int: ...
+    @property
+    def na(self) -> int: ...
+    @property
+    def actuated_index(self) -> Index: ...
+    @property
+    def springs(self) -> Sequence[Spring | JointSpring]: ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
     """What the tables of a chain are made of.
@@ -129,7 +148,7 @@ class Parts:
         length: of the chain [m].
     """
 
-    chain: ClosedChain
+    chain: Described
     links: Sequence[Link]
     anchored: Sequence[Anchored]
     rows: Sequence[Sequence[Row]]
