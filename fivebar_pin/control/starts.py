@@ -48,5 +48,5 @@ def require_standing(chain: ClosedChain, q: Array) -> None:
     loops = loops_of(chain)
     here = Configurations(loops, q[None])
     require_closed(here)
-    if loops.m and loops.opposed(here.pairs)[0]:
+    if loops.m and loops.opposed(here.seen)[0]:
         raise InvalidInputError("q", q, "closes a hinge with its axes against each other", "Use assemble.")
