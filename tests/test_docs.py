@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-EXTENDING = Path(__file__).parents[1] / "docs" / "extending.md"
+DOCS = Path(__file__).parents[1] / "docs"
+EXTENDING, CONTROL = DOCS / "extending.md", DOCS / "control.md"
 
 
 def sections(page: Path) -> dict[str, str]:
@@ -22,14 +23,17 @@ def sections(page: Path) -> dict[str, str]:
     return {heading: code for heading, code in blocks.items() if code}
 
 
-def test_the_page_has_its_sections():
+def test_the_pages_have_their_sections():
     assert "A closure kind" in sections(EXTENDING)
+    assert "Computed torque" in sections(CONTROL)
 
 
-@pytest.mark.parametrize("heading", sections(EXTENDING))
-def test_every_section_runs_in_a_fresh_interpreter(heading, tmp_path):
+@pytest.mark.parametrize(
+    ("page", "heading"), [(page, heading) for page in (EXTENDING, CONTROL) for heading in sections(page)]
+)
+def test_every_section_runs_in_a_fresh_interpreter(page, heading, tmp_path):
     """Apart from each other and from the tests: what a section registers stays in its own process."""
-    code = sections(EXTENDING)[heading]
+    code = sections(page)[heading]
     command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr

@@ -26,7 +26,7 @@ ORDER = (
     ("engine",),
     ("mechanism",),
     ("kinematics", "dynamics"),
-    ("simulation", "diagnosis", "balancing", "io", "paper"),
+    ("control", "simulation", "diagnosis", "balancing", "io", "paper"),
     ("shipped", "planar"),
     ("viz",),
     ("cli",),
