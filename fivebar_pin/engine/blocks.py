@@ -48,6 +48,8 @@ __all__ = ["combine", "factorise", "inverse_norm", "solve", "substitute"]
 
 _EXPLICIT = 4  # columns up to which the inverse is made
 _ITERATIONS = 2  # of inverse iteration, which is warm: blocks change little from one sample to the next
+_STIRRED = 0.3  # part of a direction without any symmetry that is added to where it starts [-]
+_GOLDEN = 0.6180339887498949
 
 
 @compiled
@@ -234,7 +236,8 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
     """Return the size of the (pseudo-)inverse of a factorised block, scaled: one over its smallest singular value.
 
     Small square blocks: the Frobenius norm, which is at least as large. Others: inverse iteration on A^T A, which starts
-    from the weakest direction of the sample before, in `WEAK`, and leaves that of this one there.
+    from the weakest direction of the sample before, in `WEAK`, and leaves that of this one there. It is stirred: what was
+    weakest in a symmetric mechanism is often orthogonal to what will be.
     """
     n, b, weak, columns = I[g + WIDTH], I[RHS], I[g + WEAK], I[g + COLUMN_LIST]
     explicit = n <= _EXPLICIT and I[g + HEIGHT] == n
@@ -245,7 +248,8 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
                 W[b + i] = 1.0 if i == k else 0.0
         else:
             for i in range(n):
-                W[b + i] = W[weak + i] / W[I[SCALE] + I[columns + i]]
+                stir = _STIRRED * ((_GOLDEN * i) % 1.0 - 0.5) if k == 0 else 0.0
+                W[b + i] = (W[weak + i] + stir) / W[I[SCALE] + I[columns + i]]
             _substitute_back(I, W, g)
             size = sqrt(_square(W, b, n))
             for i in range(n):

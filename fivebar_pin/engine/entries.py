@@ -18,11 +18,13 @@ from fivebar_pin.engine.tables import (
     NQ,
     NV,
     Q_HERE,
+    RATIOS,
     RESIDUAL,
     ROW_SIZE,
     ROWS,
     ROWS_END,
     SHAKING,
+    SORT,
     STATUS,
     TAU,
     TO,
@@ -138,10 +140,11 @@ def loads(
 
 @compiled
 def open_by(I: Integers, W: Array) -> float:
-    """Return the largest residual in the units of the rows [m or rad]."""
+    """Return the largest residual, in the units of rows between frames [m or rad]."""
     most = 0.0
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
-        most = max(most, abs(W[I[r + RESIDUAL]]) / W[I[r + DIRECTION] + UNIT])
+        unit = 1.0 if I[r + SORT] == RATIOS else W[I[r + DIRECTION] + UNIT]
+        most = max(most, abs(W[I[r + RESIDUAL]]) / unit)
     return most
 
 

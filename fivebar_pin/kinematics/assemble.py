@@ -103,9 +103,9 @@ def _assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) 
         q, at = _turned(chain, loops, q, x)
         if here.passive.sigma[0] >= SINGULAR:
             reached = reach(loops, prepared_of(chain), q[0], np.stack([at, x]))[1:]
-            residual = residual_of(loops, reached)[0]
-            if not closed_enough(loops, np.abs(residual).max(initial=0.0), tolerance):
-                raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()}")
+            there = Configurations(loops, reached)
+            if not closed_enough(loops, there.gap, tolerance)[0]:
+                raise open_message(loops, there.residual[0], f"at the actuated coordinates {x.tolist()}")
             return np.asarray(reached[0])
         if np.array_equal(at, x) and closed_enough(loops, here.gap, tolerance)[0]:
             return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, finite
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.engine.threads import threads_of
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.kinematics.assemble import assemble
 from fivebar_pin.kinematics.follow import follow
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, frozen
 from fivebar_pin.engine.tables import Q_HERE, STATUS
 from fivebar_pin.engine.threads import each
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
-from fivebar_pin.mechanism.closing import closed_enough, residual_of, search
+from fivebar_pin.mechanism.closing import closed_enough, search
 from fivebar_pin.mechanism.complement import complement_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
@@ -69,9 +69,7 @@ def reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> Array:
     return q
 
 
-def follow(
-    loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int
-) -> Followed:
+def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int) -> Followed:
     """Follow the branch of q0 (nq,), closed at the first sample, along a motion of the motors: q, v, a (n, na) each.
 
     Raises:
@@ -85,7 +83,7 @@ def follow(
     if len(chunks) == 1:
         chunks[0].follow(q0)
     else:
-        begun, _ = _reach(loops, ready, q0, np.ascontiguousarray(X[::_CHUNK]))
+        begun, _ = _reach(loops, ready, q0, X[::_CHUNK])
         begun[0] = q0
         each(lambda c: chunks[c].follow(begun[c]), len(chunks), threads)
     for chunk, after in zip(chunks, [*chunks[1:], None], strict=True):
@@ -109,8 +107,8 @@ class _Chunk:
         self, loops: Loops, ready: Prepared, motion: tuple[Array, Array, Array], out: Followed, first: int, last: int
     ) -> None:
         self._loops, self._ready, self._first = loops, ready, first
-        self._motion = [np.ascontiguousarray(x[first:last]) for x in motion]
-        self._line = np.ascontiguousarray(motion[0][last - 1 : last + 1])
+        self._q, self._v, self._a = (frozen(x[first:last]) for x in motion)
+        self._line = motion[0][last - 1 : last + 1]
         self._out = out.part(slice(first, last))
         self.begun = self.end = np.full(out.q.shape[1], np.nan)
         self.error: Blocked | None = None
@@ -124,9 +122,9 @@ class _Chunk:
             return  # the line to here was blocked: it is followed once the samples before it are
         I, W, out = self._ready.I, self._ready.memory(), self._out
         out.q[0] = begun
-        done = drive(I, W, *self._motion, out.q, out.v, out.a, out.N, out.gap)
+        done = drive(I, W, self._q, self._v, self._a, out.q, out.v, out.a, out.N, out.gap)
         if done < len(out.q):
-            self.error = _blocked(self._loops, self._ready, self._motion[0][done], done)
+            self.error = _blocked(self._loops, self._ready, self._q[done], done)
             _at(self.error, self._first + done)
         elif len(self._line) > 1:
             ends, self.error = _reach(self._loops, self._ready, out.q[-1], self._line)
@@ -141,7 +139,7 @@ def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, B
 
     q = np.full((X.shape[0], q0.size), np.nan)
     q[0] = q0
-    done = reach(ready.I, ready.memory(), X, q)
+    done = reach(ready.I, ready.memory(), frozen(X), q)
     return q, _at(_blocked(loops, ready, X[done], done), done) if done < X.shape[0] else None
 
 
@@ -179,9 +177,9 @@ def _blocked(loops: Loops, ready: Prepared, x: Array, done: int) -> Blocked:
     sigma = float(here.passive.sigma[0])
     if done:
         loops.set_actuated(q, x)
-        residual = residual_of(loops, search(loops, q))[0]
-        if not closed_enough(loops, np.abs(residual).max(initial=0.0), _OUT_OF_REACH):
-            return open_message(loops, residual, "at these actuated coordinates")
+        found = Configurations(loops, search(loops, q))
+        if not closed_enough(loops, found.gap, _OUT_OF_REACH)[0]:
+            return open_message(loops, found.residual[0], "at these actuated coordinates")
     return singular(sigma)
 
 
