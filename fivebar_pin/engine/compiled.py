@@ -16,11 +16,18 @@ from typing import Any, TypeVar
 
 import numba
 
+from fivebar_pin.engine.places import Places
+
 __all__ = ["compiled", "entry"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "nsz", "arcp"}}
+_OPTIONS: dict[str, Any] = {
+    "pipeline_class": Places,
+    "error_model": "numpy",
+    "nogil": True,
+    "fastmath": {"contract", "nsz", "arcp"},
+}
 _WITHIN: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _HERE = Path(__file__).resolve().parent
 _CONFIG: Any = numba.config  # what the environment says, NUMBA_CACHE_DIR among it
