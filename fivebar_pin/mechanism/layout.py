@@ -162,6 +162,11 @@ def layout_of(parts: Parts) -> tuple[e.Integers, Array]:
     return _Layout(parts).vectors()
 
 
+def _placement(x: Link) -> list[float]:
+    """Return the numbers of the placement of a link on its parent."""
+    return [*x.R.ravel(), *x.p, x.pitch, float(np.array_equal(x.R, np.eye(3)))]
+
+
 class _Layout:
     """Writes the records of a chain, and gives out places in W to what they are about."""
 
@@ -226,7 +231,7 @@ class _Layout:
         losses = (model.armature, model.damping, model.upperDryFrictionLimit)
         self.head[e.LOSSES] = self._put(np.column_stack([np.array(x) for x in losses]))
         return {
-            "fixed": [self._put(np.zeros(13)), *(self._put([*x.R.ravel(), *x.p, x.pitch]) for x in parts.links)],
+            "fixed": [self._put(np.zeros(14)), *(self._put(_placement(x)) for x in parts.links)],
             "mass": [-1, *(self._mass(j) for j in range(1, len(parts.links) + 1))],
             "frames": [self._put(self._frames(c)) for c in parts.anchored],
             "direction": [self._put(row) for c, rows in self._with_rows() for row in self._directions(c, rows)],
