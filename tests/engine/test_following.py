@@ -328,8 +328,10 @@ def test_the_certificate_is_the_one_of_its_equations_and_bounds_what_it_says(fam
 def test_a_certificate_needs_every_block_contracting_from_either_end_and_no_sign_turned(family):
     """Each of its conditions broken by itself, and what is certified held against all of them."""
     accepted = refused = 0
-    for s, _ in steps_by(family, 24):
+    for s, _ in steps_by(family, 80 if family == "platform" else 24):
         blocks, nb = s.blocks, len(s.blocks)
+        for _ in range(20):  # until the norms of large blocks stay
+            calls.certify(s.I, s.W)
         certified, signs, before = calls.certify(s.I, s.W), s.numbers(e.SIGNS_BEFORE, nb), s.numbers(e.NORMS_BEFORE, nb)
         same, norms = np.array_equal(s.numbers(e.SIGNS, nb), signs), np.array(s.numbers(e.NORMS, nb))
 
@@ -342,7 +344,7 @@ def test_a_certificate_needs_every_block_contracting_from_either_end_and_no_sign
                 before[:] = old
                 assert calls.certify(s.I, s.W) == (same and bound <= 0.5)
                 accepted, refused = accepted + (bound <= 0.5), refused + (bound > 0.5)
-        if certified and worst(np.full(nb, 1e6)) > 0.5:
+        if certified and worst(norms) < 0.45 and worst(np.full(nb, 1e6)) > 0.5:
             for k in range(nb):
                 before[:] = 0.0
                 signs[k] *= -1.0
