@@ -23,7 +23,7 @@ from fivebar_pin.engine.tables import (
     ENTRIES_END,
     ENTRY_SIZE,
     JACOBIAN0,
-    MEMORY,
+    M_BAR,
     MOTORS,
     N_HERE,
     NA,
@@ -89,10 +89,10 @@ def reduced(
             twists(I, W)
             lost = need(I, W, (0.0, 0.0, 0.0), links, points, wrenches, i)
             torques(I, W)
-            reduced_inertia(I, W, I[MEMORY])
+            reduced_inertia(I, W, I[M_BAR])
             set_out(W, I[TAU], bias, i, 0, I[NA])
             set_out(W, I[A_HERE], rest, i, 0, I[NV])
-            k = I[MEMORY]
+            k = I[M_BAR]
             for b in range(I[NA]):
                 for a in range(I[NA]):
                     M[i, b, a] = W[k]

@@ -297,7 +297,7 @@ class _Layout:
             e.Q_HERE: nq, e.V_HERE: nv, e.A_HERE: nv, e.X: nv, e.MOVED: nv, e.TARGET: na, e.JOINT: nv, e.TAU: na,
             e.SHAKING: 6, e.CARRIED: 6, e.RHS: tall, e.RAW_RHS: tall, e.RESIDUALS: len(per_row), e.Q_BEFORE: nq, e.J_HERE: jacobian,
             e.J_BEFORE: jacobian, e.SIGNS: nb, e.NORMS: nb, e.SIGNS_BEFORE: nb, e.NORMS_BEFORE: nb, e.REACH: 1,
-            e.LAST_STEP: 1, e.SECOND_STEP: 1, e.CLOSED: 1, e.GOING: 1, e.STATUS: 1, e.TO: na,
+            e.LAST_STEP: 1, e.SECOND_STEP: 1, e.CLOSED: 1, e.GOING: 1, e.STATUS: 1, e.TO: na, e.M_BAR: na * na,
             e.TO_V: na, e.TO_A: na,
         }  # fmt: skip
         for field, count in sizes.items():

@@ -12,7 +12,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
-from fivebar_pin.engine.tables import NA, NQ, Integers
+from fivebar_pin.engine.tables import NQ, Integers
 from fivebar_pin.mechanism.layout import Index, Parts, blocks_of, joined_rows, layout_of
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.loops import Loops, loops_of
@@ -48,9 +48,9 @@ class Prepared:
         self._threads = threading.local()
 
     def memory(self) -> Array:
-        """Return the working memory of this thread; behind it is room for a matrix of the motors."""
+        """Return the working memory of this thread."""
         if not hasattr(self._threads, "W"):
-            self._threads.W = np.concatenate([self.W, np.zeros(int(self.I[NA]) ** 2)])
+            self._threads.W = np.array(self.W)
         found: Array = self._threads.W
         return found
 

@@ -27,10 +27,12 @@ class Loads:
 
     def __init__(self, chain: fb.ClosedChain, q, v, a, N, *, links=NONE[0], points=NONE[1], wrenches=None) -> None:
         self.s, n = Sampled(chain), len(q)
-        out = [np.full((n, k), np.nan) for k in (chain.na, 6, 6, chain.nv)]
+        table = np.full((n, chain.na + 12 + chain.nv), np.nan)
         given = (links, points, np.zeros((n, 0, 6)) if wrenches is None else wrenches)
-        self.lost = entries.loads(self.s.I, self.s.W, q, v, a, N, ABOUT, *given, *out)
-        self.tau, self.shaking, self.carried, self.joint = out
+        self.lost = entries.loads(self.s.I, self.s.W, q, v, a, N, ABOUT, *given, table)
+        ends = np.cumsum([chain.na, 6, 6])
+        self.tau, self.shaking, frame, self.joint = np.split(table, ends, axis=1)
+        self.carried = frame - self.shaking
 
 
 def free(chain: fb.ClosedChain, n: int) -> tuple[np.ndarray, ...]:

@@ -16,7 +16,7 @@ from fivebar_pin.engine.tables import (
     GOING,
     J_BEFORE,
     J_HERE,
-    MEMORY,
+    M_BAR,
     MOTORS,
     MOVED,
     NA,
@@ -89,10 +89,10 @@ def advance(I, W, first):
 def mass_matrix(I, W, M):
     """Write the reduced inertia M (na, na) of the poses and the complement that stand there."""
     twists(I, W)
-    reduced_inertia(I, W, I[MEMORY])
+    reduced_inertia(I, W, I[M_BAR])
     for a in range(I[NA]):
         for b in range(I[NA]):
-            M[a, b] = W[I[MEMORY] + a * I[NA] + b]
+            M[a, b] = W[I[M_BAR] + a * I[NA] + b]
 
 
 @entry
