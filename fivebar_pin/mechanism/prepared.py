@@ -12,13 +12,16 @@ from fivebar_pin.closures import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
 from fivebar_pin.engine.tables import NQ, Integers
+from fivebar_pin.mechanism.dimensions import dimensions_of
 from fivebar_pin.mechanism.layout import Index, Parts, blocks_of, joined_rows, layout_of
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.rank import ranks_of
 
-__all__ = ["Prepared", "prepared_of"]
+__all__ = ["Prepared", "parts_of", "prepared_of"]
+
+_SILENT = 1e-12  # share of the largest singular value that is the round-off of a row that says nothing [-]
 
 
 class Prepared:
@@ -47,44 +50,69 @@ class Prepared:
 @once_per_chain
 def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
+    return Prepared(*layout_of(parts_of(chain)))
+
+
+def parts_of(chain: ClosedChain) -> Parts:
+    """Return what the tables of a chain are made of: independent rows, and the blocks they make."""
     loops = loops_of(chain)
     kept = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
-    starts = np.cumsum([0, *(J.shape[1] for _, J in kept)])
-    touched = [c.columns for c, (_, J) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
+    starts = np.cumsum([0, *(J.shape[1] for _, _, J in kept)])
+    touched = [c.columns for c, (_, _, J) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
     systems = []
     for group in loops.independent:
         rows = np.concatenate([np.arange(starts[k], starts[k + 1]) for k in group.members])
-        wide = [_spread(kept[k][1], loops.anchored[k].columns, chain.nv) for k in group.members]
+        wide = [_spread(kept[k][2], loops.anchored[k].columns, chain.nv) for k in group.members]
         systems.append((rows, loops.passive[group.passive], _combinations(np.concatenate(wide))))
-    blocks = blocks_of(systems, touched, chain.actuated_index)
-    rows_kept = [rows for rows, _ in kept]
-    return Prepared(
-        *layout_of(
-            Parts(chain, links_of(chain.model), loops.anchored, rows_kept, blocks, loops.column_scale, loops.length)
-        )
+    return Parts(
+        chain,
+        links_of(chain.model),
+        loops.anchored,
+        [rows for rows, _, _ in kept],
+        blocks_of(systems, touched, chain.actuated_index),
+        [left for _, left, _ in kept],
+        loops.column_scale,
+        loops.length,
+        dimensions_of(chain),
     )
 
 
-def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], Array]:
-    """Return the rows of a closure without those that say nothing anywhere, and their scaled Jacobian.
+def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], tuple[Row, ...], Array]:
+    """Return the rows of a closure that say something, those that say nothing anywhere, and the scaled Jacobian.
 
     Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane.
     """
     J, length = J * loops.column_scale[anchored.columns], loops.length
     if not isinstance(anchored, AnchoredFrames):
-        return (), J * anchored.row_scale(length, loops.column_scale)[:, None]
+        return (), (), J * anchored.row_scale(length, loops.column_scale)[:, None]
     rows = anchored.closure.rows
     kept: list[Row] = []
+    left: list[Row] = []
     scaled: list[Array] = []
     for sort in dict.fromkeys((row.sort, row.other.tobytes()) for row in rows):
         some = [k for k, row in enumerate(rows) if (row.sort, row.other.tobytes()) == sort]
         mine = J[:, some] * (1.0 / length if sort[0] in ("along", "length") else 1.0)
-        U, s, _ = np.linalg.svd(np.concatenate(list(mine), axis=1), full_matrices=False)
-        r = int(ranks_of(s))
-        mix = np.eye(len(some)) if r == len(some) else U[:, :r].T
-        kept += [rows[k] for k in some] if r == len(some) else joined_rows([rows[k] for k in some], mix)
+        mix, idle = _split(np.concatenate(list(mine), axis=1))
+        kept += joined_rows([rows[k] for k in some], mix)
+        left += joined_rows([rows[k] for k in some], idle)
         scaled.append(np.matmul(mix, mine))
-    return tuple(kept), np.concatenate(scaled, axis=1)
+    return tuple(kept), tuple(left), np.concatenate(scaled, axis=1)
+
+
+def _split(wide: Array) -> tuple[Array, Array]:
+    """Return combinations of rows (k, m) that are independent, and the others, which vanish.
+
+    Rows that are zero are left out and the others stay as they are, so that they are the same for all designs of a
+    linkage; only where that is not all they are mixed.
+    """
+    U, s, _ = np.linalg.svd(wide, full_matrices=False)
+    r = int(ranks_of(s))
+    sizes = np.linalg.norm(wide, axis=1)
+    silent = np.argsort(sizes)[: len(wide) - r]
+    if np.all(sizes[silent] <= _SILENT * s.max(initial=0.0)):
+        same = np.eye(len(wide))
+        return np.delete(same, silent, axis=0), same[np.sort(silent)]
+    return np.asarray(U[:, :r].T), np.asarray(U[:, r:].T)
 
 
 def _spread(J: Array, columns: Index, nv: int) -> Array:
