@@ -14,9 +14,10 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, cross, frozen, seal
+from fivebar_pin._arrays import Array, checked, frozen, seal
 from fivebar_pin.closures.closure import Entry, Mark
-from fivebar_pin.closures.frame_closure import FrameClosure, FramePair
+from fivebar_pin.closures.frame_closure import FrameClosure
+from fivebar_pin.closures.points import FramePair
 from fivebar_pin.errors import InvalidInputError
 
 __all__ = ["AxisClosure", "Triad"]
@@ -38,6 +39,7 @@ class AxisClosure(FrameClosure):
     axis: npt.ArrayLike = (0.0, 0.0, 1.0)
 
     entries: ClassVar[tuple[Entry, ...]]
+    may_oppose: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         axis = checked("closure axis", self.axis, (3,))
@@ -71,20 +73,3 @@ class AxisClosure(FrameClosure):
     def seen_axis(self, pair: FramePair) -> Array:
         """Return the axis of frame 2 in the axes of frame 1, Q n (..., 3)."""
         return np.asarray(np.matmul(np.matmul(np.swapaxes(pair.R1, -1, -2), pair.R2), self.triad[0]))
-
-    def tilt(self, pair: FramePair) -> Array:
-        """Return the tilts (..., 2) [-]."""
-        return np.asarray(self.seen_axis(pair) @ self.triad[1].T)
-
-    def tilt_selector(self, pair: FramePair) -> Array:
-        """Return what takes the relative angular velocity, world axes, to the rate of the tilts (..., 2, 3)."""
-        turning = cross(self.seen_axis(pair)[..., None, :], self.triad[1])
-        return np.asarray(np.matmul(turning, np.swapaxes(pair.R1, -1, -2)))
-
-    def tilt_drift(self, pair: FramePair, V1: Array, V2: Array, A1: Array, A2: Array) -> Array:
-        """Return the second rate of the tilts at zero joint accelerations (..., 2); exact everywhere."""
-        R1T, w1, w2 = np.swapaxes(pair.R1, -1, -2), V1[..., 3:], V2[..., 3:]
-        w = np.matmul(R1T, (w2 - w1)[..., None])[..., 0]
-        alpha = np.matmul(R1T, (A2[..., 3:] - A1[..., 3:] - cross(w1, w2))[..., None])[..., 0]
-        Qn = self.seen_axis(pair)
-        return np.asarray((cross(alpha, Qn) + cross(w, cross(w, Qn))) @ self.triad[1].T)

@@ -134,6 +134,7 @@ class Closure(Immutable, metaclass=_Family):
         joined: how many things it joins; None: any number.
         family: the registered kinds by their word.
         by_points: its rows are those of two points that coincide, in the axes of frame 1.
+        may_oppose: it can be met falsely, with axes against each other.
     """
 
     name: str = field(default="", kw_only=True)
@@ -143,6 +144,7 @@ class Closure(Immutable, metaclass=_Family):
     entries: ClassVar[tuple[Entry, ...]] = ()
     joined: ClassVar[int | None] = 2
     by_points: ClassVar[bool] = False
+    may_oppose: ClassVar[bool] = False
     family: ClassVar[dict[str, type[Closure]]] = {}
 
     if TYPE_CHECKING:

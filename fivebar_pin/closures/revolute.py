@@ -7,10 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
 from fivebar_pin.closures.axis_closure import AxisClosure
 from fivebar_pin.closures.closure import Entry
-from fivebar_pin.closures.frame_closure import FramePair, point_drift, point_rows, point_selector
 from fivebar_pin.closures.rows import Row, along, tilt
 
 __all__ = ["Revolute"]
@@ -21,7 +19,6 @@ class Revolute(AxisClosure, word="revolute"):
     """A hinge: the points coincide and the axes are parallel. Five rows [m, -]."""
 
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z", "tilt 1", "tilt 2")
-    row_units: ClassVar[tuple[str, ...]] = ("m", "m", "m", "-", "-")
     entries: ClassVar[tuple[Entry, ...]] = (
         Entry("axis", 3, "a revolute closure needs its hinge axis, e.g. [0, 0, 1]"),
     )
@@ -31,18 +28,3 @@ class Revolute(AxisClosure, word="revolute"):
         """Along the three axes, and the two tilts."""
         n, across = self.triad
         return (*(along(axis) for axis in np.eye(3)), *(tilt(t, n) for t in across))
-
-    def residual(self, pair: FramePair) -> Array:
-        """Return the three rows of the points and the two tilts."""
-        return np.concatenate([point_rows(pair), self.tilt(pair)], axis=-1)
-
-    def selector(self, pair: FramePair) -> Array:
-        """Return T (..., 5, 6)."""
-        T = point_selector(pair, 5)
-        T[..., 3:, 3:] = self.tilt_selector(pair)
-        return T
-
-    def drift(self, pair: FramePair, V1: Array, V2: Array, A1: Array, A2: Array) -> Array:
-        """Return the second rate at zero joint accelerations; exact everywhere."""
-        rates = point_drift(pair, V1, V2, A1, A2), self.tilt_drift(pair, V1, V2, A1, A2)
-        return np.concatenate(rates, axis=-1)

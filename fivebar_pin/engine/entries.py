@@ -7,6 +7,7 @@ from fivebar_pin.engine.bodies import drag, inertia_forces, joint_forces, torque
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.complement import accelerations, velocities
 from fivebar_pin.engine.following import FOLLOWED, advance
+from fivebar_pin.engine.rows import look
 from fivebar_pin.engine.springs import apply, pull
 from fivebar_pin.engine.tables import (
     A_HERE,
@@ -18,11 +19,13 @@ from fivebar_pin.engine.tables import (
     NQ,
     NV,
     Q_HERE,
+    RATIOS,
     RESIDUAL,
     ROW_SIZE,
     ROWS,
     ROWS_END,
     SHAKING,
+    SORT,
     STATUS,
     TAU,
     TO,
@@ -34,7 +37,7 @@ from fivebar_pin.engine.tables import (
 )  # fmt: skip
 from fivebar_pin.engine.tree import accelerate, move, place
 
-__all__ = ["drive", "loads", "reach"]
+__all__ = ["drive", "loads", "reach", "residual"]
 
 
 @entry
@@ -71,8 +74,8 @@ def drive(
 
 
 @entry
-def reach(I: Integers, W: Array, x_a: Array, q: Array) -> int:
-    """Follow the branch of q[0] along straight lines of the motors (n, na) and write q (n, nq) at their ends.
+def reach(I: Integers, W: Array, x_a: Array, q: Array, gap: Array) -> int:
+    """Follow the branch of q[0] along straight lines of the motors (n, na); write q and the residual at their ends.
 
     Returns:
         Number of ends that were reached; `STATUS` tells how it ended.
@@ -85,8 +88,18 @@ def reach(I: Integers, W: Array, x_a: Array, q: Array) -> int:
         advance(I, W, done == 0)
         if W[I[STATUS]] == FOLLOWED:
             write(W, I[Q_HERE], q, done, I[NQ])
+            gap[done] = open_by(I, W)
             done += 1
     return done
+
+
+@entry
+def residual(I: Integers, W: Array, q: Array) -> float:
+    """Return the largest closure residual at q[0] [m or rad]."""
+    read(W, I[Q_HERE], q, 0, I[NQ])
+    place(I, W)
+    look(I, W)
+    return open_by(I, W)
 
 
 @entry
@@ -138,10 +151,11 @@ def loads(
 
 @compiled
 def open_by(I: Integers, W: Array) -> float:
-    """Return the largest residual in the units of the rows [m or rad]."""
+    """Return the largest residual, in the units of rows between frames [m or rad]."""
     most = 0.0
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
-        most = max(most, abs(W[I[r + RESIDUAL]]) / W[I[r + DIRECTION] + UNIT])
+        unit = 1.0 if I[r + SORT] == RATIOS else W[I[r + DIRECTION] + UNIT]
+        most = max(most, abs(W[I[r + RESIDUAL]]) / unit)
     return most
 
 

@@ -10,14 +10,13 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, SingularityError
-from fivebar_pin.kinematics.follow import reach
+from fivebar_pin.kinematics.follow import open_by, reach
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
-from fivebar_pin.mechanism.prepared import prepared_of
-from fivebar_pin.mechanism.rank import SINGULAR
+from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 
-__all__ = ["assemble", "checked_search", "closed_from_starts", "closure_residual"]
+__all__ = ["assemble", "assemble_near", "checked_search", "closed_from_starts", "closure_residual"]
 
 
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
@@ -62,10 +61,10 @@ def assemble(
         return np.stack(each) if each else np.zeros((0, chain.nq))
     x = checked("q_actuated", x, (chain.na,))
     if near is not None:
-        return _assemble_near(chain, x, checked("near", near, (chain.nq,)), tolerance)
+        return assemble_near(chain, x, checked("near", near, (chain.nq,)), tolerance)
     for reference in chain.references.values():
         with contextlib.suppress(AssemblyError, SingularityError):
-            return _assemble_near(chain, x, reference, tolerance)
+            return assemble_near(chain, x, reference, tolerance)
     q, residual = closed_from_starts(chain, loops, x, starts, seed, tolerance)
     if not q.shape[0]:
         raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")
@@ -95,24 +94,32 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
     return loops
 
 
-def _assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
-    loops = loops_of(chain)
-    q = np.array(near[None])
-    here = Configurations(loops, q)
-    if loops.m and closed_enough(loops, here.gap, _FOLLOWED)[0] and not loops.opposed(here.pairs)[0]:
-        q, at = _turned(chain, loops, q, x)
-        if here.passive.sigma[0] >= SINGULAR:
-            reached = reach(loops, prepared_of(chain), q[0], np.stack([at, x]))[1:]
-            residual = residual_of(loops, reached)[0]
-            if not closed_enough(loops, np.abs(residual).max(initial=0.0), tolerance):
+def assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
+    """Return the configuration (nq,) at actuated coordinates x (na,) that a configuration (nq,) picks."""
+    loops, ready, q = loops_of(chain), prepared_of(chain), np.array(near[None])
+    if loops.m and closed_enough(loops, open_by(ready, q), _FOLLOWED) and not _opposed(loops, q):
+        turned, at = _turned(loops, ready, q, x)
+        try:
+            reached, gap = reach(loops, ready, turned[0], np.array([at, x]))
+        except SingularityError as error:
+            if error.sample:
+                raise
+            if np.array_equal(at, x) and closed_enough(loops, Configurations(loops, q).gap, tolerance)[0]:
+                return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
+        else:
+            if not closed_enough(loops, max(gap[1], ready.left), tolerance):
+                residual = residual_of(loops, reached[1:])[0]
                 raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()}")
-            return np.asarray(reached[0])
-        if np.array_equal(at, x) and closed_enough(loops, here.gap, tolerance)[0]:
-            return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
+            return np.asarray(reached[1])
     loops.set_actuated(q, x)
     if not loops.m:
         return np.asarray(q[0])
     return _searched_near(loops, q, x, tolerance)
+
+
+def _opposed(loops: Loops, q: Array) -> bool:
+    """Tell whether a hinge of q (1, nq) is closed with its axes against each other."""
+    return loops.may_oppose and bool(loops.opposed(loops.pairs(loops.tree.poses(q)))[0])
 
 
 def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:
@@ -137,20 +144,18 @@ def _nudged(loops: Loops, q: Array, x: Array) -> Array:
     return starts
 
 
-def _turned(chain: ClosedChain, loops: Loops, q: Array, x: Array) -> tuple[Array, Array]:
+def _turned(loops: Loops, ready: Prepared, q: Array, x: Array) -> tuple[Array, Array]:
     """Return q (1, nq) with whole turns added that lead towards x (na,), and its actuated coordinates (na,).
 
     A turn of a joint that no closure counts leads to the same pose. A joint whose coordinates are a cosine and a sine
     is in the turn nearest to x; others keep the sense in which they turn.
     """
-    at, counted = loops.actuated_of(q)[0], _counted(chain)
-    for a, k in enumerate(loops.actuated):
-        turns = (x[a] - at[a]) / (2.0 * np.pi)
-        if loops.tree.is_cyclic(int(k)):
-            at[a] += 2.0 * np.pi * np.round(turns)
-        elif loops.tree.is_angle(int(k)) and int(k) not in counted:
-            at[a] += 2.0 * np.pi * np.trunc(turns)
-    turned = np.array(q)
+    at, (whole, cyclic) = loops.actuated_of(q)[0], ready.turns
+    turns = (x - at) / (2.0 * np.pi)
+    turns = np.where(cyclic, np.round(turns), np.where(whole, np.trunc(turns), 0.0))
+    if not turns.any():
+        return q, at
+    at, turned = at + 2.0 * np.pi * turns, np.array(q)
     loops.set_actuated(turned, at)
     return turned, at
 

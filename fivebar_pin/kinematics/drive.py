@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, finite
+from fivebar_pin._arrays import Array, checked, finite, number, seal
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.engine.threads import threads_of
-from fivebar_pin.kinematics.assemble import assemble
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
+from fivebar_pin.kinematics.assemble import assemble, assemble_near
 from fivebar_pin.kinematics.follow import follow
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
@@ -54,6 +54,7 @@ def drive(
         SingularityError: the motion meets a type 2 singularity; names sample and time.
         InvalidInputError: motion of the wrong width, joint limits passed, motion left undetermined.
     """
+    number("tolerance", tolerance, positive=True)
     loops = loops_of(chain)
     loops.require_determined()
     if motion.na != chain.na:
@@ -61,13 +62,17 @@ def drive(
             "motion columns", motion.na, f"must be {chain.na}, one for each of {', '.join(chain.actuated)}"
         )
     try:
-        q0 = assemble(chain, motion.q[0], near, tolerance=tolerance)
+        if near is None:
+            q0 = assemble(chain, motion.q[0], tolerance=tolerance)
+        else:
+            q0 = assemble_near(chain, motion.q[0], checked("near", near, (chain.nq,)), tolerance)
         found = follow(loops, prepared_of(chain), q0, (motion.q, motion.v, motion.a), threads_of(threads))
         _require_closed(loops, found.q, found.gap, tolerance)
     except (AssemblyError, SingularityError) as error:
         raise _with_time(error, motion) from None
     if limits == "check":
         _check_limits(chain, found.q, motion)
+    seal((found.q, found.v, found.a, found.N, found.gap))
     return Trajectory(motion.t, found.q, found.v, found.a, found.N, found.gap)
 
 
@@ -82,9 +87,9 @@ def _require_closed(loops: Loops, q: Array, gap: Array, tolerance: float) -> Non
 
 def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
     lower, upper = chain.model.lowerPositionLimit, chain.model.upperPositionLimit
-    bad = np.argwhere((q < lower - _SLACK) | (q > upper + _SLACK))
-    if bad.size:
-        k, i = (int(b) for b in bad[0])
+    outside = (q < lower - _SLACK) | (q > upper + _SLACK)
+    if outside.any():
+        k, i = (int(b) for b in np.argwhere(outside)[0])
         owner = int(np.searchsorted(np.array(chain.model.idx_qs)[1:], i, side="right"))
         raise InvalidInputError(
             f"joint {chain.model.names[owner]} at sample {k} (t = {motion.t[k]:.6g} s)",

@@ -12,17 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Array
+from fivebar_pin._arrays import Array, frozen
 from fivebar_pin.engine.tables import Q_HERE, STATUS
 from fivebar_pin.engine.threads import each
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
-from fivebar_pin.mechanism.closing import closed_enough, residual_of, search
+from fivebar_pin.mechanism.closing import closed_enough, search
 from fivebar_pin.mechanism.complement import complement_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
 from fivebar_pin.mechanism.prepared import Prepared
 
-__all__ = ["Followed", "follow", "reach", "singular"]
+__all__ = ["Followed", "follow", "open_by", "reach", "singular"]
 
 
 _CHUNK = 4096  # samples that are followed one after the other
@@ -55,23 +55,30 @@ class Followed:
         return Followed(self.q[k], self.v[k], self.a[k], self.N[k], self.gap[k])
 
 
-def reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> Array:
+def reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Array]:
     """Return the configurations (n, nq) on the branch of q0 (nq,), closed at X[0], along straight lines to X (n, na).
+
+    Their closure residuals (n,) [m or rad] are the second result.
 
     Raises:
         SingularityError, AssemblyError: the way is blocked; with an attribute `sample` at the end not reached.
         InvalidInputError: the closures tie the motors to each other; a line too long.
     """
     _require_near(loops, X)
-    q, error = _reach(loops, ready, q0, X)
+    q, gap, error = _reach(loops, ready, q0, X)
     if error is not None:
         raise error
-    return q
+    return q, gap
 
 
-def follow(
-    loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int
-) -> Followed:
+def open_by(ready: Prepared, q: Array) -> float:
+    """Return the largest closure residual at q (1, nq) [m or rad], that of rows which say nothing left out."""
+    from fivebar_pin.engine.entries import residual
+
+    return float(residual(ready.I, ready.memory(), frozen(q)))
+
+
+def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int) -> Followed:
     """Follow the branch of q0 (nq,), closed at the first sample, along a motion of the motors: q, v, a (n, na) each.
 
     Raises:
@@ -85,7 +92,7 @@ def follow(
     if len(chunks) == 1:
         chunks[0].follow(q0)
     else:
-        begun, _ = _reach(loops, ready, q0, np.ascontiguousarray(X[::_CHUNK]))
+        begun, _, _ = _reach(loops, ready, q0, X[::_CHUNK])
         begun[0] = q0
         each(lambda c: chunks[c].follow(begun[c]), len(chunks), threads)
     for chunk, after in zip(chunks, [*chunks[1:], None], strict=True):
@@ -109,8 +116,8 @@ class _Chunk:
         self, loops: Loops, ready: Prepared, motion: tuple[Array, Array, Array], out: Followed, first: int, last: int
     ) -> None:
         self._loops, self._ready, self._first = loops, ready, first
-        self._motion = [np.ascontiguousarray(x[first:last]) for x in motion]
-        self._line = np.ascontiguousarray(motion[0][last - 1 : last + 1])
+        self._q, self._v, self._a = (frozen(x[first:last]) for x in motion)
+        self._line = motion[0][last - 1 : last + 1]
         self._out = out.part(slice(first, last))
         self.begun = self.end = np.full(out.q.shape[1], np.nan)
         self.error: Blocked | None = None
@@ -124,31 +131,33 @@ class _Chunk:
             return  # the line to here was blocked: it is followed once the samples before it are
         I, W, out = self._ready.I, self._ready.memory(), self._out
         out.q[0] = begun
-        done = drive(I, W, *self._motion, out.q, out.v, out.a, out.N, out.gap)
+        done = drive(I, W, self._q, self._v, self._a, out.q, out.v, out.a, out.N, out.gap)
         if done < len(out.q):
-            self.error = _blocked(self._loops, self._ready, self._motion[0][done], done)
+            self.error = _blocked(self._loops, self._ready, self._q[done], done)
             _at(self.error, self._first + done)
         elif len(self._line) > 1:
-            ends, self.error = _reach(self._loops, self._ready, out.q[-1], self._line)
+            ends, _, self.error = _reach(self._loops, self._ready, out.q[-1], self._line)
             self.end = ends[1]
             if self.error is not None:
                 _at(self.error, self._first + done)
 
 
-def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Blocked | None]:
-    """Return the configurations reached, nan where none were, and why."""
+def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Array, Blocked | None]:
+    """Return the configurations reached, nan where none were, their residuals, and why."""
     from fivebar_pin.engine.entries import reach
 
-    q = np.full((X.shape[0], q0.size), np.nan)
+    q, gap = np.full((X.shape[0], q0.size), np.nan), np.empty(X.shape[0])
     q[0] = q0
-    done = reach(ready.I, ready.memory(), X, q)
-    return q, _at(_blocked(loops, ready, X[done], done), done) if done < X.shape[0] else None
+    done = reach(ready.I, ready.memory(), frozen(X), q, gap)
+    return q, gap, _at(_blocked(loops, ready, X[done], done), done) if done < X.shape[0] else None
 
 
 def _require_near(loops: Loops, X: Array) -> None:
     """Raise for a step so long that to follow it would take for ever."""
-    step = np.abs(np.diff(X, axis=0)) / loops.column_scale[loops.actuated]
-    if step.size and step.max() > _FAR:
+    if len(X) < 2 or not X.shape[1]:
+        return
+    step = np.abs(X[1:] - X[:-1]) / loops.column_scale[loops.actuated]
+    if step.max() > _FAR:
         k, a = (int(i) for i in np.argwhere(step == step.max())[0])
         raise InvalidInputError(
             f"step of motor {a} to sample {k + 1}",
@@ -179,9 +188,9 @@ def _blocked(loops: Loops, ready: Prepared, x: Array, done: int) -> Blocked:
     sigma = float(here.passive.sigma[0])
     if done:
         loops.set_actuated(q, x)
-        residual = residual_of(loops, search(loops, q))[0]
-        if not closed_enough(loops, np.abs(residual).max(initial=0.0), _OUT_OF_REACH):
-            return open_message(loops, residual, "at these actuated coordinates")
+        found = Configurations(loops, search(loops, q))
+        if not closed_enough(loops, found.gap, _OUT_OF_REACH)[0]:
+            return open_message(loops, found.residual[0], "at these actuated coordinates")
     return singular(sigma)
 
 

@@ -113,9 +113,9 @@ def residual_of(loops: Loops, q: Array) -> Array:
     return Configurations(loops, q).residual
 
 
-def closed_enough(loops: Loops, residual: Array, tolerance: float) -> npt.NDArray[np.bool_]:
+def closed_enough(loops: Loops, residual: npt.ArrayLike, tolerance: float) -> npt.NDArray[np.bool_]:
     """Whether residuals (n,) [m or rad] are closed: below the tolerance times the chain's length (or one radian)."""
-    return np.asarray(residual <= tolerance * max(1.0, loops.length))
+    return np.asarray(np.asarray(residual) <= tolerance * max(1.0, loops.length))
 
 
 def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:

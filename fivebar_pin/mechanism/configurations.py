@@ -45,8 +45,8 @@ class Configurations:
 
     @lazy
     def gap(self) -> Array:
-        """Largest of them (n,) [m or rad]."""
-        return np.asarray(np.abs(self.residual).max(axis=1, initial=0.0))
+        """Largest of them (n,) [m or rad]; a row of coordinates counts as if its largest ratio were one."""
+        return np.asarray(np.abs(self.residual * self.loops.unit).max(axis=1, initial=0.0))
 
     @lazy
     def reduced(self) -> Array:

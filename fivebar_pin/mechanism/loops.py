@@ -35,6 +35,8 @@ class Loops:
         reduce: constant row combinations that are independent in general, (r, m); all redundancy that holds at every
             configuration (the out-of-plane rows of a planar loop) is gone from them, and their unit is one.
         column_scale: unit of every velocity coordinate (nv,): 1 for angles, the chain's length for slides.
+        unit: what a residual is multiplied by to be one of lengths and angles (m,): 1 but for rows of coordinates, which
+            say the same whatever factor they are multiplied by.
     """
 
     def __init__(self, chain: ClosedChain) -> None:
@@ -52,6 +54,8 @@ class Loops:
         self.column_scale = np.array([1.0 if self.tree.is_angle(k) else self.length for k in range(self.tree.nv)])
         scales = [c.row_scale(self.length, self.column_scale) for c in self.anchored]
         self.row_scale = np.concatenate(scales or [np.zeros(0)])
+        tied = [closure.ends == () for closure in self.closures for _ in closure.row_names]
+        self.unit = np.where(np.array(tied, dtype=np.bool_), self.row_scale, 1.0)
         self._groups = [self._group(members) for members in self._members()]
         self.reduce = np.zeros((sum(g.reduce.shape[0] for g in self._groups), self.m))
         done = 0
@@ -219,6 +223,21 @@ class Loops:
         """The Jacobians of all closures, in their columns, at some generic configurations (n, m, columns) each."""
         poses, pairs = self._generic
         return [c.jacobian(x, poses) for c, x in zip(self.anchored, pairs, strict=True)]
+
+    @property
+    def may_oppose(self) -> bool:
+        """Whether some closure can be met falsely, axes against each other."""
+        return any(c.may_oppose for c in self.closures)
+
+    @property
+    def left(self) -> float:
+        """What combinations of rows that no motion changes leave open, whatever the configuration [m, rad or -]."""
+        if not self.m:
+            return 0.0
+        _, pairs = self._generic
+        residual = self.residual(pairs)[0] * self.row_scale
+        Q, _ = np.linalg.qr((self.reduce / self.row_scale).T)
+        return float(np.abs((residual - Q @ (Q.T @ residual)) / self.row_scale * self.unit).max())
 
     @cached_property
     def _generic(self) -> tuple[Poses, list[Any]]:

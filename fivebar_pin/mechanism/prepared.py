@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 
 import numpy as np
+import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, seal
 from fivebar_pin.chain import ClosedChain
@@ -23,6 +24,8 @@ __all__ = ["Prepared", "parts_of", "prepared_of"]
 
 _SILENT = 1e-12  # share of the largest singular value that is the round-off of a row that says nothing [-]
 
+Flags = npt.NDArray[np.bool_]
+
 
 class Prepared:
     """The two vectors of the engine.
@@ -31,12 +34,15 @@ class Prepared:
         I: records of the chain, never written.
         W: its constants, and working memory as it is before the first sample; never written.
         nq: length of a configuration.
+        turns: which motors come back to the same pose after a whole turn, and which of these do not count turns (na,) each.
+        left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they are
+            [m, rad or -].
     """
 
-    def __init__(self, I: Integers, W: Array) -> None:
-        self.I, self.W, self.nq = I, W, int(I[NQ])
-        for vector in (I, W):
-            seal(vector)
+    def __init__(self, vectors: tuple[Integers, Array], turns: tuple[Flags, Flags], left: float) -> None:
+        (self.I, self.W), self.turns, self.left = vectors, turns, left
+        self.nq = int(self.I[NQ])
+        seal((*vectors, *turns))
         self._threads = threading.local()
 
     def memory(self) -> Array:
@@ -50,7 +56,8 @@ class Prepared:
 @once_per_chain
 def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
-    return Prepared(*layout_of(parts_of(chain)))
+    loops = loops_of(chain)
+    return Prepared(layout_of(parts_of(chain)), _turns(chain, loops), loops.left)
 
 
 def parts_of(chain: ClosedChain) -> Parts:
@@ -75,6 +82,15 @@ def parts_of(chain: ClosedChain) -> Parts:
         loops.length,
         dimensions_of(chain),
     )
+
+
+def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
+    """Return which motors come back to the same pose after a whole turn, and which of these do not count turns."""
+    names = {name for closure in chain.closures for name in closure.counted}
+    counted = {int(chain.model.idx_vs[chain.model.getJointId(name)]) for name in names}
+    motors = [int(k) for k in loops.actuated]
+    whole = [loops.tree.is_angle(k) and k not in counted for k in motors]
+    return np.array(whole, dtype=np.bool_), np.array([loops.tree.is_cyclic(k) for k in motors], dtype=np.bool_)
 
 
 def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], tuple[Row, ...], Array]:

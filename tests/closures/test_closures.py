@@ -33,8 +33,8 @@ import fivebar_pin as fb
 from fivebar_pin import viz
 from fivebar_pin.closures import ClosureKind
 from fivebar_pin.closures.closure import Entry
-from fivebar_pin.closures.frame_closure import point_drift, point_rows, point_selector
-from fivebar_pin.closures.weld import log3
+from fivebar_pin.closures.points import log3
+from fivebar_pin.closures.rows import along
 from fivebar_pin.errors import AssemblyError, FileFormatError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.viz._mechanism import _draw_closures
@@ -177,7 +177,7 @@ def test_revolute_closure_is_the_weld_of_pinocchio_without_the_turn_about_the_ax
 @pytest.mark.parametrize("kind", KINDS)
 def test_rows_are_named_in_their_order(kind):
     closure = made(("a", "b"), kind)
-    assert len(closure.row_names) == len(closure.row_units) == closure.kind.rows
+    assert len(closure.row_names) == len(closure.rows) == closure.kind.rows
     first = {"cylindrical": ("across 1", "across 2", "tilt 1"), "distance": ("length",)}
     assert closure.row_names[:3] == first.get(kind, ("x", "y", "z"))
 
@@ -356,17 +356,11 @@ def slot():
     class Slot(fb.closures.FrameClosure, word="slot"):
         depth: float = 0.0
         row_names = ("x",)
-        row_units = ("m",)
         entries = (Entry("depth", None, "a slot needs its depth, e.g. 0.1"),)
 
-        def residual(self, pair):
-            return point_rows(pair)[..., :1] - self.depth
-
-        def selector(self, pair):
-            return point_selector(pair, 3)[..., :1, :]
-
-        def drift(self, pair, V1, V2, A1, A2):
-            return point_drift(pair, V1, V2, A1, A2)[..., :1]
+        @property
+        def rows(self):
+            return (along((1.0, 0.0, 0.0), self.depth),)
 
     yield Slot
     del fb.Closure.family["slot"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from mechanisms import add, at, body, four_bar, point, spherical_four_bar
+from mechanisms import add, at, body, four_bar, point
 
 import fivebar_pin as fb
 from fivebar_pin import Motion
@@ -124,7 +124,9 @@ def test_whole_turns_of_a_motor_that_nothing_counts_lead_to_the_same_pose(turns)
     crank = chain.actuated_index[0]
     found = fb.assemble(chain, [0.7 + 2.0 * np.pi * turns], start)
     assert found[crank] == 0.7 + 2.0 * np.pi * turns
-    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * start), rtol=0.0, atol=1e-7 * max(1.0, abs(turns) * 1e-8))
+    np.testing.assert_allclose(
+        np.exp(1j * found), np.exp(1j * start), rtol=0.0, atol=1e-7 * max(1.0, abs(turns) * 1e-8)
+    )
 
 
 def test_turns_that_a_coupling_counts_are_made():
@@ -140,5 +142,7 @@ def test_turns_that_a_coupling_counts_are_made():
 def test_a_step_that_would_take_for_ever_is_refused():
     chain = fb.load("four_bar_crank_rocker")
     motion = Motion([0.0, 1.0], [[0.7], [0.7 + 2e6]], np.zeros((2, 1)), np.zeros((2, 1)))
-    with pytest.raises(InvalidInputError, match=r"step of motor 0 to sample 1 = 2000000.0 but must be below 1e\+06 rad"):
+    with pytest.raises(
+        InvalidInputError, match=r"step of motor 0 to sample 1 = 2000000.0 but must be below 1e\+06 rad"
+    ):
         fb.drive(chain, motion)
