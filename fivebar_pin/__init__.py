@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fivebar_pin import balancing, closures, io, motion, paper, planar, shipped, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
-    from fivebar_pin.closures import Closure, ClosureKind
+    from fivebar_pin.closures import Closure
     from fivebar_pin.diagnosis import Diagnosis, diagnose
     from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics, reduced_dynamics
     from fivebar_pin.errors import FiveBarPinError
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
     from fivebar_pin.planar.loading import load
     from fivebar_pin.simulation import simulate
     from fivebar_pin.springs import JointSpring, Spring
+    from fivebar_pin.sweeps import sweep
     from fivebar_pin.trajectory import Trajectory
 
 __all__ = [
     "BalanceConditions",
     "ClosedChain",
     "Closure",
-    "ClosureKind",
     "Design",
     "Diagnosis",
     "FiveBarPinError",
@@ -74,6 +74,7 @@ __all__ = [
     "score",
     "shipped",
     "simulate",
+    "sweep",
     "viz",
 ]
 
@@ -93,6 +94,7 @@ _LATE = {
     "shipped": (),
     "simulation": ("simulate",),
     "springs": ("JointSpring", "Spring"),
+    "sweeps": ("sweep",),
     "trajectory": ("Trajectory",),
     "viz": (),
 }

@@ -35,6 +35,7 @@ from fivebar_pin.engine.tables import (
     JACOBIAN,
     JACOBIAN0,
     LOCAL,
+    MOTORS,
     MOVED,
     NA,
     NORMS,
@@ -187,5 +188,6 @@ def left_open(I: Integers, W: Array, q: Array, N: Array, sample: int) -> float:
             for e in range(I[r + ENTRIES], I[r + ENTRIES_END], ENTRY_SIZE):
                 rate += W[k] * N[sample, I[e + COLUMN], a]
                 k += 1
-            most = most if abs(rate) <= most else abs(rate)
+            size = abs(rate) * W[I[SCALE] + I[I[MOTORS] + a]]
+            most = most if size <= most else size
     return most
