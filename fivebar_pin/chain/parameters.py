@@ -78,8 +78,8 @@ def _exponentials(twist: Array, x: Array) -> Array:
         M[:, :3, 3] = x[:, None] * v
         return M
     K, angle = skew(w / rate), (rate * x)[:, None, None]
-    s, versed = np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2  # 1 - cos, as exact for a screw that hardly turns
-    M[:, :3, :3] += s * K + (1.0 - np.cos(angle)) * (K @ K)
+    c, s, versed = np.cos(angle), np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2  # exact where it hardly turns, too
+    M[:, :3, :3] = c * np.eye(3) + s * K + versed * np.outer(w, w) / rate**2
     M[:, :3, 3] = np.matmul(angle * np.eye(3) + versed * K + (angle - s) * (K @ K), v / rate)
     return M
 

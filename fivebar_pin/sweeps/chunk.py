@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, frozen
+from fivebar_pin._arrays import Array, frozen, seal
 from fivebar_pin.engine.tables import NA, NV, STATUS
 from fivebar_pin.sweeps.problem import Problem
 from fivebar_pin.sweeps.result import Status
@@ -58,21 +58,32 @@ class _Bench:
         motion = problem.motion
         self.q_a, self.v_a, self.a_a = frozen(motion.q), frozen(motion.v), frozen(motion.a)
         self.nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((n, 0, 6))
+        seal(self.nothing)
+        self.path = tuple(_seen(x) for x in (self.q, self.v, self.a, self.N))
+        self.moved: tuple[Status, int] | None = None
 
     def run(self, knots: Array) -> tuple[Status, int]:
         """Compute a design, whose constants at all knots are given, as far as it goes."""
-        from fivebar_pin.engine.entries import drive, loads
+        if not np.isfinite(knots[-1]).all():
+            return Status.UNREAL, 0
+        if self.moved is None or self.problem.parameters:  # bodies alone do not change how it moves
+            self.moved = self._move(knots)
+        if self.moved[0] != Status.OK:
+            return self.moved
+        return self.moved if self._load(knots[-1]) else (Status.SINGULAR, 0)
+
+    def _move(self, knots: Array) -> tuple[Status, int]:
+        """Drive a design."""
+        from fivebar_pin.engine.entries import drive
         from fivebar_pin.engine.sweeping import lead
 
         I, W, n = self.tables.I, self.W, len(self.gap)
-        if not np.isfinite(knots[-1]).all():
-            return Status.UNREAL, 0
         W[:] = self.tables.W
         self.q0[0] = self.problem.q0
         lead(I, W, self.tables.before, knots, self.q0)
         if W[I[STATUS]] != 0.0:
             return Status.OPEN, 0
-        W[knots.shape[1] :] = self.tables.W[knots.shape[1] :]
+        self._begin(knots[-1])
         self.q[0] = self.q0[0]
         done = int(drive(I, W, self.q_a, self.v_a, self.a_a, self.q, self.v, self.a, self.N, self.gap))
         if done and self._leaves_the_plane(done - 1):
@@ -81,20 +92,30 @@ class _Bench:
             return Status.SINGULAR, done
         low, high = self.problem.limits
         beyond = np.any((self.q < low - _SLACK) | (self.q > high + _SLACK), axis=1)
-        if beyond.any():
-            return Status.LIMITS, int(np.argmax(beyond))
-        outputs = (self.tau, self.shaking, self.carried, self.tree)
-        lost = loads(I, W, self.q, self.v, self.a, self.N, self.problem.about, *self.nothing, *outputs)
-        return (Status.OK, n) if lost < 0 else (Status.SINGULAR, 0)
+        return (Status.LIMITS, int(np.argmax(beyond))) if beyond.any() else (Status.OK, n)
+
+    def _load(self, constants: Array) -> bool:
+        """Compute what moves a design, and tell whether all its springs have a direction."""
+        from fivebar_pin.engine.entries import loads
+
+        self._begin(constants)
+        I, (q, v, a, N), outside, about = self.tables.I, self.path, self.nothing, self.problem.about
+        lost = loads(I, self.W, q, v, a, N, about, *outside, self.tau, self.shaking, self.carried, self.tree)
+        return bool(lost < 0)
+
+    def _begin(self, constants: Array) -> None:
+        """Make the memory that of a design, as it is before the first sample: nothing of the one before is left."""
+        self.W[:] = self.tables.W
+        self.W[: constants.size] = constants
 
     def _leaves_the_plane(self, last: int) -> bool:
         """Tell whether rows that say nothing of the chain say something of this design."""
         from fivebar_pin.engine.sweeping import left_open
 
         checks = self.tables.checks
-        return checks is not None and not all(
-            left_open(checks, self.W, self.q, self.N, sample) <= _LEFT for sample in {0, last}
-        )
+        if checks is None:
+            return False
+        return not all(left_open(checks, self.W, self.q, self.N, sample) <= _LEFT for sample in {0, last})
 
     def tell(self, series: dict[str, Array], i: int) -> None:
         """Write what was computed where it is wanted."""
@@ -112,3 +133,10 @@ class _Bench:
         }
         for name, values in series.items():
             values[i] = found[name]
+
+
+def _seen(array: Array) -> Array:
+    """Return the same memory, not to be written: the engine's code for such arrays is there already."""
+    view = array.view()
+    view.setflags(write=False)
+    return view

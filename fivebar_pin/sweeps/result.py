@@ -27,7 +27,7 @@ class Status(IntEnum):
     LIMITS = 3
     """A joint passes its limits."""
     UNLIKE = 4
-    """Its closures act in other directions than those of the chain: it leaves the plane. It needs a chain of its own."""
+    """Its closures act in other directions than those of the chain: it leaves the plane. It needs its own chain."""
     UNREAL = 5
     """A body is none: a bar without length, corners on a line, cut down to less than nothing."""
 

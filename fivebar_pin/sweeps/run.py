@@ -107,7 +107,7 @@ def _designs(
     values = {str(name): _values(chain, str(name), x) for name, x in (parameters or {}).items()}
     pi = None
     if inertias is not None:
-        pi = checked("inertias", inertias, (None, len(chain.joints), 10))
+        pi = _bodies(chain, inertias)
     counts = {name: x.size for name, x in values.items() if x.ndim} | ({} if pi is None else {"inertias": len(pi)})
     if len(set(counts.values())) > 1:
         raise InvalidInputError("numbers of designs", counts, "must be the same for all")
@@ -122,11 +122,23 @@ def _values(chain: ClosedChain, name: str, given: npt.ArrayLike) -> Array:
     what = f"parameter {name}"
     shape: tuple[int | None, ...] = (None,) if reals(what, given).ndim else ()
     x = checked(what, given, shape)
-    bad = np.flatnonzero(x <= 0.0) if name in chain.geometry.lengths else ()
-    if len(bad):
+    bad = np.flatnonzero(x <= 0.0)
+    if bad.size and name in chain.geometry.lengths:
+        i = int(bad[0])
         rule = "must be positive [m]: the bar would turn over"
-        raise InvalidInputError(f"length {name} of design {bad[0]}", float(np.atleast_1d(x)[bad[0]]), rule)
+        raise InvalidInputError(f"length {name} of design {i}", float(x.flat[i]), rule)
     return x
+
+
+def _bodies(chain: ClosedChain, inertias: npt.ArrayLike) -> Array:
+    """Return inertial parameters (n, nb, 10) that can be those of bodies."""
+    pi = checked("inertias", inertias, (None, len(chain.joints), 10))
+    bad = (pi[..., 0] < 0.0) | ((pi[..., 0] == 0.0) & pi[..., 1:4].any(axis=-1))
+    if bad.any():
+        i, body = (int(x) for x in np.argwhere(bad)[0])
+        rule = "is no body: its mass must not be negative, and what has none has no first moment"
+        raise InvalidInputError(f"inertias of design {i}, joint {chain.joints[body]}", pi[i, body].tolist(), rule)
+    return pi
 
 
 def _limits(chain: ClosedChain, limits: str) -> tuple[Array, Array]:

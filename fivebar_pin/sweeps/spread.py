@@ -28,7 +28,7 @@ def by_threads(problem: Problem, threads: int, store: Store | None) -> Iterator[
                 store.write(k, found)
         return found
 
-    if threads == 1 or len(problem.chunks) == 1:
+    if threads == 1 or len(problem.chunks) <= 1:
         yield from ((k, work(k)) for k in problem.chunks)
         return
     with ThreadPoolExecutor(min(threads, len(problem.chunks))) as pool:

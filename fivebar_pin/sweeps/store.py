@@ -38,7 +38,7 @@ class Store:
         """Return a chunk that is there."""
         names = [term.name for term in self._problem.terms]
         try:
-            with np.load(self.path(k), allow_pickle=False) as found:
+            with np.load(io.BytesIO(self.path(k).read_bytes()), allow_pickle=False) as found:
                 chunk = Chunk(found["status"], found["reached"], {name: found[f"of_{name}"] for name in names})
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
             return None
