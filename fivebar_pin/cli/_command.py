@@ -18,6 +18,7 @@ from fivebar_pin.errors import FiveBarPinError
 
 __all__ = ["main"]
 
+_WITHOUT_ENGINE = ("new",)
 _MOST_ON_A_LINE = 2000
 """Characters of an error message that are printed [-]."""
 
@@ -82,6 +83,10 @@ def _parser() -> argparse.ArgumentParser:
 def _run(chosen: argparse.Namespace) -> int:
     import numpy as np
 
+    from fivebar_pin.cli._first_use import compile_once
+
+    if chosen.command not in _WITHOUT_ENGINE:
+        compile_once()
     with np.errstate(all="ignore"):  # the library refuses results that are not finite; numpy's warnings only add lines
         return int(chosen.run(chosen))
 

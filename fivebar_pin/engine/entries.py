@@ -37,7 +37,7 @@ from fivebar_pin.engine.tables import (
 )  # fmt: skip
 from fivebar_pin.engine.tree import accelerate, move, place
 
-__all__ = ["drive", "loads", "reach", "residual"]
+__all__ = ["drive", "loads", "residual"]
 
 
 @entry
@@ -68,26 +68,6 @@ def drive(
                 for b in range(I[NA]):
                     N[done, i, b] = W[k]
                     k += 1
-            gap[done] = open_by(I, W)
-            done += 1
-    return done
-
-
-@entry
-def reach(I: Integers, W: Array, x_a: Array, q: Array, gap: Array) -> int:
-    """Follow the branch of q[0] along straight lines of the motors (n, na); write q and the residual at their ends.
-
-    Returns:
-        Number of ends that were reached; `STATUS` tells how it ended.
-    """
-    read(W, I[Q_HERE], q, 0, I[NQ])
-    W[I[STATUS]] = FOLLOWED
-    done = 0
-    while W[I[STATUS]] == FOLLOWED and done < x_a.shape[0]:
-        read(W, I[TO], x_a, done, I[NA])
-        advance(I, W, done == 0)
-        if W[I[STATUS]] == FOLLOWED:
-            write(W, I[Q_HERE], q, done, I[NQ])
             gap[done] = open_by(I, W)
             done += 1
     return done

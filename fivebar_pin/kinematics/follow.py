@@ -50,6 +50,14 @@ class Followed:
     N: Array
     gap: Array
 
+    @staticmethod
+    def room(loops: Loops, n: int, nq: int) -> Followed:
+        """Return room for n samples, the configurations nan."""
+        nv, na = loops.tree.nv, loops.actuated.size
+        return Followed(
+            np.full((n, nq), np.nan), np.empty((n, nv)), np.empty((n, nv)), np.empty((n, nv, na)), np.empty(n)
+        )
+
     def part(self, k: slice) -> Followed:
         """Return some samples, the same memory."""
         return Followed(self.q[k], self.v[k], self.a[k], self.N[k], self.gap[k])
@@ -85,9 +93,9 @@ def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array,
         SingularityError, AssemblyError: with an attribute `sample` at the first sample not reached.
         InvalidInputError: the closures tie the motors to each other; steps too long.
     """
-    X, (n, na), nv = motion[0], motion[0].shape, loops.tree.nv
+    X, n = motion[0], len(motion[0])
     _require_near(loops, X)
-    out = Followed(np.empty((n, q0.size)), np.empty((n, nv)), np.empty((n, nv)), np.empty((n, nv, na)), np.empty(n))
+    out = Followed.room(loops, n, q0.size)
     chunks = [_Chunk(loops, ready, motion, out, k, min(k + _CHUNK, n)) for k in range(0, n, _CHUNK)]
     if len(chunks) == 1:
         chunks[0].follow(q0)
@@ -144,12 +152,12 @@ class _Chunk:
 
 def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Array, Blocked | None]:
     """Return the configurations reached, nan where none were, their residuals, and why."""
-    from fivebar_pin.engine.entries import reach
+    from fivebar_pin.engine.entries import drive
 
-    q, gap = np.full((X.shape[0], q0.size), np.nan), np.empty(X.shape[0])
-    q[0] = q0
-    done = reach(ready.I, ready.memory(), frozen(X), q, gap)
-    return q, gap, _at(_blocked(loops, ready, X[done], done), done) if done < X.shape[0] else None
+    out, still = Followed.room(loops, len(X), q0.size), frozen(np.zeros_like(X))
+    out.q[0] = q0
+    done = drive(ready.I, ready.memory(), frozen(X), still, still, out.q, out.v, out.a, out.N, out.gap)
+    return out.q, out.gap, _at(_blocked(loops, ready, X[done], done), done) if done < len(X) else None
 
 
 def _require_near(loops: Loops, X: Array) -> None:
