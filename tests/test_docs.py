@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-EXTENDING = Path(__file__).parents[1] / "docs" / "extending.md"
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = ("extending", "sweeps")  # whose sections run each by itself
 
 
 def sections(page: Path) -> dict[str, str]:
@@ -23,13 +24,13 @@ def sections(page: Path) -> dict[str, str]:
 
 
 def test_the_page_has_its_sections():
-    assert "A closure kind" in sections(EXTENDING)
+    assert "A closure kind" in sections(DOCS / "extending.md")
 
 
-@pytest.mark.parametrize("heading", sections(EXTENDING))
-def test_every_section_runs_in_a_fresh_interpreter(heading, tmp_path):
+@pytest.mark.parametrize(("page", "heading"), [(p, h) for p in PAGES for h in sections(DOCS / f"{p}.md")])
+def test_every_section_runs_in_a_fresh_interpreter(page, heading, tmp_path):
     """Apart from each other and from the tests: what a section registers stays in its own process."""
-    code = sections(EXTENDING)[heading]
+    code = sections(DOCS / f"{page}.md")[heading]
     command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
