@@ -21,7 +21,7 @@ from fivebar_pin.sweeps.terms import Term, widths
 __all__ = ["Problem", "Tables"]
 
 _KNOT = 0.1  # turn of a placement from one knot to the next: between them its axes are straight lines [rad]
-_MOST_NUMBERS = 400_000  # numbers along the motions of a chunk, at most: they stay in cache
+_MOST_NUMBERS = 400_000  # numbers of a chunk, at most: they stay in cache
 _MOST_DESIGNS = 256  # designs of a chunk, at most: enough for NumPy's calls not to count
 
 
@@ -82,7 +82,8 @@ class Problem(Immutable):
     def chunk(self) -> int:
         """Number of designs that are worked on together; it does not depend on who does the work."""
         columns = sum(widths(self.chain)[name] for name in {term.quantity for term in self.terms})
-        return max(1, min(_MOST_DESIGNS, _MOST_NUMBERS // max(1, columns * len(self.motion))))
+        numbers = columns * len(self.motion) + self.knots * self.tables.before.size
+        return max(1, min(_MOST_DESIGNS, _MOST_NUMBERS // numbers))
 
     @property
     def chunks(self) -> list[slice]:

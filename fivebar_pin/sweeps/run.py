@@ -14,6 +14,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.engine.threads import threads_of
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.kinematics import assemble
+from fivebar_pin.kinematics.follow import require_near
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.motion import Motion
 from fivebar_pin.sweeps.chunk import Chunk
@@ -82,10 +83,12 @@ def sweep(
     terms = terms_of(of)
     if limits not in ("check", "ignore"):
         raise InvalidInputError("limits", limits, "must be 'check' or 'ignore'")
-    loops_of(chain).require_determined()
+    loops = loops_of(chain)
+    loops.require_determined()
     if motion.na != chain.na:
         names = ", ".join(chain.actuated)
         raise InvalidInputError("motion columns", motion.na, f"must be {chain.na}, one for each of {names}")
+    require_near(loops, motion.q)
     size = sum(float(np.prod(term.shape(chain, len(motion)))) for term in terms)
     require_memory("of", [term.name for term in terms], 8.0 * n * size)
     workers, point = threads_of(threads), checked("about", about, (3,))

@@ -129,4 +129,4 @@ def test_designs_are_counted_in_chunks_that_fit_into_memory():
     long = motion_of(chain, 20_000)
     asked = (chain, np.zeros(4), long, 100, {"left": np.full(100, 0.15)}, None, terms_of("q"))
     problem = Problem(*asked, np.zeros(3), (np.zeros(4), np.zeros(4)))
-    assert problem.chunk == 5 and len(problem.chunks) == 20 and problem.chunks[-1].stop == 100
+    assert problem.chunk == 4 and len(problem.chunks) == 25 and problem.chunks[-1].stop == 100

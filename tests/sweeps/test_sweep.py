@@ -336,6 +336,12 @@ def test_what_is_wrong_is_said_at_once(change, kind, message):
         fb.sweep(five_bar(), motion_of(five_bar()), **({"parameters": {"left": [0.15]}} | change))
 
 
+def test_a_motion_that_leaps_is_refused():
+    leap = fb.Motion([0.0, 1.0], [[0.0, 0.0], [1e7, 0.0]], np.zeros((2, 2)), np.zeros((2, 2)))
+    with pytest.raises(InvalidInputError, match=r"step of motor 0 to sample 1 = .* Take more samples"):
+        fb.sweep(five_bar(), leap, parameters={"left": [0.15]})
+
+
 def test_a_chain_that_cannot_be_assembled_is_an_error():
     chain = five_bar()
     motion = motion_of(chain)
