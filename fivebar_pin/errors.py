@@ -9,7 +9,6 @@ from typing import Any
 
 __all__ = [
     "AssemblyError",
-    "BranchError",
     "FileFormatError",
     "FiveBarPinError",
     "InfeasibleError",
@@ -113,10 +112,6 @@ class AssemblyError(FiveBarPinError):
     ) -> None:
         self.closure, self.residual, self.sample, self.time = closure, residual, sample, time
         super().__init__(message)
-
-
-class BranchError(AssemblyError):
-    """The loops close, but not on the assembly mode that was asked for or was being followed."""
 
 
 class SingularityError(FiveBarPinError):

@@ -50,7 +50,7 @@ _WIDER, _WIDENED, _HALVED = 1.6, 5, 4
 """A drive that is to be tight: how much wider it is tried next, how often, and how often halfway back."""
 _IN_VAIN = 100
 """Motions not kept in a row after which there is thought to be none to keep."""
-_BLOCKED = ("AssemblyError", "BranchError", "SingularityError")
+_BLOCKED = ("AssemblyError", "SingularityError")
 """What is said of a motion that cannot be followed."""
 _BLOCK = 2048
 """Configurations worked on at a time."""

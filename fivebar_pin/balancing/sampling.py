@@ -196,7 +196,7 @@ class _Draw:
             here = ground(Configurations(loops, q))
             good = here.sound & (here.control > HELD) & self._limits.inside(loops, q)
             if loops.m:
-                good &= ~loops.opposed(loops.pairs(loops.tree.poses(q)))
+                good &= ~loops.opposed(loops.see(q))
             self._tried += starts.shape[0]
             if good.any():
                 break

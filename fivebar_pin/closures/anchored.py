@@ -1,40 +1,27 @@
-"""A closure that has found its place in one model: what it does over a batch of configurations."""
+"""A closure that has found its place in one model."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
 
-__all__ = ["Anchored", "Segment", "TreePoses", "TreeRates"]
+__all__ = ["Anchored", "FramePair", "Segment"]
 
 
-class TreePoses(Protocol):
-    """Configurations q (n, nq), world poses of the joints R (n, 3, 3), p (n, 3) each, motion subspaces S (n, 6, nv)."""
+@dataclass(frozen=True, slots=True, eq=False)
+class FramePair:
+    """World poses of the two frames of a closure. R (..., 3, 3), p (..., 3)."""
 
-    @property
-    def q(self) -> Array: ...
-    @property
-    def R(self) -> Sequence[Array]: ...
-    @property
-    def p(self) -> Sequence[Array]: ...
-    @property
-    def S(self) -> Array: ...
-
-
-class TreeRates(Protocol):
-    """Spatial velocity V and acceleration A at zero joint accelerations, per joint (n, 6), world axes and origin."""
-
-    @property
-    def V(self) -> Sequence[Array]: ...
-    @property
-    def A(self) -> Sequence[Array]: ...
+    R1: Array
+    p1: Array
+    R2: Array
+    p2: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +52,7 @@ class Named(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Anchored(ABC):
-    """A closure with what it joins found in one model. What `look` saw is handed to all the others.
+    """A closure with what it joins found in one model.
 
     Attributes:
         closure: what it is made of.
@@ -81,29 +68,9 @@ class Anchored(ABC):
     tied: tuple[int, ...]
     columns: npt.NDArray[np.intp]
 
-    @abstractmethod
-    def look(self, poses: TreePoses) -> Any:
-        """Return what the equations need of a batch of n configurations."""
-
-    @abstractmethod
-    def residual(self, seen: Any) -> Array:
-        """Return the rows that vanish when the closure is met (n, m)."""
-
-    @abstractmethod
-    def jacobian(self, seen: Any, poses: TreePoses) -> Array:
-        """Return the Jacobian in its columns (n, m, columns): residual rate = jacobian @ v[columns]."""
-
-    @abstractmethod
-    def drift(self, seen: Any, rates: TreeRates) -> Array:
-        """Return the second rate of the residual at zero joint accelerations (n, m), the closure being met."""
-
-    @abstractmethod
-    def selector(self, seen: Any) -> Array:
-        """Return T (n, m, 6): T^T lambda is the wrench on body 2 at the world origin, its opposite on body 1."""
-
-    @abstractmethod
-    def place(self, seen: Any) -> tuple[Array, Array]:
-        """Return the point (n, 3) and the axes (n, 3, 3) that the wrench is told at and in."""
+    def place(self, pair: FramePair) -> tuple[Array, Array]:
+        """Return the point (n, 3) and the axes (n, 3, 3) that its wrench is told at and in: of frame 2, and of frame 1."""
+        return pair.p2, pair.R1
 
     @abstractmethod
     def row_scale(self, length: float, column_scale: Array) -> Array:
@@ -113,9 +80,9 @@ class Anchored(ABC):
     def numbers(self) -> Array:
         """Return the numbers that, with the kind and the joints, make it the closure it is (k,)."""
 
-    def opposed(self, seen: Any) -> npt.NDArray[np.bool_]:
+    def opposed(self, pair: FramePair) -> npt.NDArray[np.bool_]:
         """Return where it is met falsely, axes against each other (n,)."""
-        return np.zeros(self.residual(seen).shape[0], dtype=np.bool_)
+        return np.zeros(pair.p1.shape[0], dtype=np.bool_)
 
     def segments(self) -> tuple[Segment, ...]:
         """Return the lines to draw."""

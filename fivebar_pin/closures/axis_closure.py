@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, frozen, seal
+from fivebar_pin.closures.anchored import FramePair
 from fivebar_pin.closures.closure import Entry, Mark
 from fivebar_pin.closures.frame_closure import FrameClosure
-from fivebar_pin.closures.points import FramePair
 from fivebar_pin.errors import InvalidInputError
 
 __all__ = ["AxisClosure", "Triad"]

@@ -133,7 +133,6 @@ class Closure(Immutable, metaclass=_Family):
         entries: what the sidecar states of it.
         joined: how many things it joins; None: any number.
         family: the registered kinds by their word.
-        by_points: its rows are those of two points that coincide, in the axes of frame 1.
         may_oppose: it can be met falsely, with axes against each other.
     """
 
@@ -143,7 +142,6 @@ class Closure(Immutable, metaclass=_Family):
     row_names: ClassVar[tuple[str, ...]]
     entries: ClassVar[tuple[Entry, ...]] = ()
     joined: ClassVar[int | None] = 2
-    by_points: ClassVar[bool] = False
     may_oppose: ClassVar[bool] = False
     family: ClassVar[dict[str, type[Closure]]] = {}
 

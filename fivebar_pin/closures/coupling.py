@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, all_of, number
-from fivebar_pin.closures.anchored import Anchored, Segment, TreePoses, TreeRates
+from fivebar_pin.closures.anchored import Anchored, Segment
 from fivebar_pin.closures.closure import Closure, Entry
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -106,7 +106,6 @@ class Coupling(Closure, word="coupling"):
             (0, 0),
             joints,
             np.array([k for k, _, _ in by_column], dtype=np.intp),
-            np.array([model.idx_qs[j] for j in joints], dtype=np.intp),
             np.array([c for _, _, c in by_column]),
         )
 
@@ -135,30 +134,10 @@ class Coupling(Closure, word="coupling"):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Coupled(Anchored):
-    """A coupling with its coordinates found: places in q and ratios, in the order of the columns."""
+    """A coupling with its coordinates found: ratios in the order of the columns. Bodies feel no force but in the joints."""
 
     closure: Coupling
-    places: npt.NDArray[np.intp]
     ratios: Array
-
-    def look(self, poses: TreePoses) -> Any:
-        return poses.q[:, self.places]
-
-    def residual(self, seen: Array) -> Array:
-        return np.asarray(seen @ self.ratios - self.closure.offset)[:, None]
-
-    def jacobian(self, seen: Array, poses: TreePoses) -> Array:
-        return np.broadcast_to(self.ratios, (len(seen), 1, self.ratios.size))
-
-    def drift(self, seen: Array, rates: TreeRates) -> Array:
-        return np.zeros((len(seen), 1))
-
-    def selector(self, seen: Array) -> Array:
-        """Bodies feel no force but that in the joints."""
-        return np.zeros((len(seen), 1, 6))
-
-    def place(self, seen: Array) -> tuple[Array, Array]:
-        return np.zeros((len(seen), 3)), np.broadcast_to(np.eye(3), (len(seen), 3, 3))
 
     def row_scale(self, length: float, column_scale: Array) -> Array:
         """Make the largest scaled ratio one, whatever factor the row is multiplied by."""

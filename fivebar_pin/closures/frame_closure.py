@@ -9,7 +9,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -17,10 +16,9 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array, all_of
-from fivebar_pin.closures.anchored import Anchored, Segment, TreePoses, TreeRates
+from fivebar_pin.closures.anchored import Anchored, FramePair, Segment
 from fivebar_pin.closures.closure import Closure
-from fivebar_pin.closures.points import FramePair
-from fivebar_pin.closures.rows import Row, Rows
+from fivebar_pin.closures.rows import Row
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = ["AnchoredFrames", "FrameClosure"]
@@ -49,11 +47,6 @@ class FrameClosure(Closure):
     @abstractmethod
     def rows(self) -> tuple[Row, ...]:
         """Its rows."""
-
-    @cached_property
-    def equations(self) -> Rows:
-        """What its rows are over a batch."""
-        return Rows(self.rows)
 
     def opposed(self, pair: FramePair) -> npt.NDArray[np.bool_]:
         """Return where the loop is closed falsely (...)."""
@@ -114,37 +107,6 @@ class AnchoredFrames(Anchored):
     p: tuple[Array, Array]
     sign: Array
 
-    def look(self, poses: TreePoses) -> FramePair:
-        """Return the world poses of both frames."""
-        (i, j), (Ri, Rj), (pi, pj) = self.joints, self.R, self.p
-        return FramePair(
-            np.matmul(poses.R[i], Ri),
-            poses.p[i] + np.matmul(poses.R[i], pi),
-            np.matmul(poses.R[j], Rj),
-            poses.p[j] + np.matmul(poses.R[j], pj),
-        )
-
-    def residual(self, seen: FramePair) -> Array:
-        """Return the rows (n, m)."""
-        return self.closure.equations.residual(seen)
-
-    def jacobian(self, seen: FramePair, poses: TreePoses) -> Array:
-        """Return the Jacobian in its columns (n, m, columns)."""
-        return np.asarray(np.matmul(self.closure.equations.selector(seen), poses.S[:, :, self.columns] * self.sign))
-
-    def drift(self, seen: FramePair, rates: TreeRates) -> Array:
-        """Return the second rate at zero joint accelerations (n, m)."""
-        i, j = self.joints
-        return self.closure.equations.drift(seen, rates.V[i], rates.V[j], rates.A[i], rates.A[j])
-
-    def selector(self, seen: FramePair) -> Array:
-        """Return T (n, m, 6)."""
-        return self.closure.equations.selector(seen)
-
-    def place(self, seen: FramePair) -> tuple[Array, Array]:
-        """Return the origin of frame 2 and the axes of frame 1."""
-        return seen.p2, seen.R1
-
     def row_scale(self, length: float, column_scale: Array) -> Array:
         """Measure lengths in lengths of the chain."""
         return np.array([1.0 / length if row.unit == "m" else 1.0 for row in self.closure.rows])
@@ -154,9 +116,9 @@ class AnchoredFrames(Anchored):
         placed = [x.ravel() for x in (*self.R, *self.p)]
         return np.concatenate([*placed, *(np.ravel(x) for x in self.closure.values().values())])
 
-    def opposed(self, seen: FramePair) -> npt.NDArray[np.bool_]:
+    def opposed(self, pair: FramePair) -> npt.NDArray[np.bool_]:
         """Return where the loop is closed falsely (n,)."""
-        return self.closure.opposed(seen)
+        return self.closure.opposed(pair)
 
     def segments(self) -> tuple[Segment, ...]:
         """Return the rod, where it is one."""

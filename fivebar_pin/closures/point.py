@@ -18,7 +18,6 @@ class Point(FrameClosure, word="3d"):
     """Two points coincide: a ball joint, or a pin of a planar loop. Three rows [m]."""
 
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")
-    by_points: ClassVar[bool] = True
 
     @property
     def rows(self) -> tuple[Row, ...]:

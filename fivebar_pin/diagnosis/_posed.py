@@ -71,7 +71,7 @@ def _close(chain: ClosedChain, starts: list[Array]) -> tuple[Array, bool]:
 
 
 def _gaps(loops: Loops, q: Array) -> list[float]:
-    residual = loops.residual(loops.pairs(loops.tree.poses(q[None])))[0]
+    residual = loops.see(q[None]).residual[0]
     return [float(np.abs(residual[c.rows]).max()) for c in loops.anchored]
 
 

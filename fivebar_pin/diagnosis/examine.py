@@ -130,7 +130,6 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
                     "assemble(chain, ...) closes them; what follows holds for the closest configuration found.",
                 )
             )
-    poses = loops.tree.poses(found[None])
     if loops.m and not closed_enough(loops, np.array([opened]), GIVEN)[0]:
         name, size = loops.worst(residual_of(loops, found[None])[0])
         findings.append(
@@ -140,7 +139,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
                 f"Check {loops.what_to_check}.",
             )
         )
-    elif loops.m and loops.opposed(loops.pairs(poses))[0]:
+    elif loops.m and loops.opposed(loops.see(found[None]))[0]:
         findings.append(
             Finding(
                 "error", "a hinge closes back to front: its two axes point against each other. Turn one frame over."

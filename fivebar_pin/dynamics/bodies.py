@@ -77,7 +77,7 @@ def rotor_energy(chain: ClosedChain, v: Array) -> Array:
 
 def centres(bodies: Bodies, poses: Poses) -> Array:
     """Return the world positions of the mass centres (n, nb, 3)."""
-    R, p = np.stack(poses.R[1:], axis=1), np.stack(poses.p[1:], axis=1)
+    R, p = np.swapaxes(poses.R[1:], 0, 1), np.swapaxes(poses.p[1:], 0, 1)
     return np.asarray(p + np.matmul(R, bodies.lever[..., None])[..., 0])
 
 
@@ -93,13 +93,13 @@ def accelerations(tree: Tree, poses: Poses, rates: Rates, a: Array) -> Array:
     for joint in tree.joints:
         if joint is not None:
             out.append(out[joint.parent] + np.matmul(poses.S[:, :, joint.v], a[:, joint.v, None])[..., 0])
-    return np.asarray(np.stack(out[1:], axis=1) + np.stack(rates.A[1:], axis=1))
+    return np.asarray(np.stack(out[1:], axis=1) + np.swapaxes(rates.A[1:], 0, 1))
 
 
 def body_rates(tree: Tree, bodies: Bodies, poses: Poses, rates: Rates, a: Array) -> BodyRates:
     """Return momenta and their rates (Newton and Euler for every body)."""
-    c, R = centres(bodies, poses), np.stack(poses.R[1:], axis=1)
-    V, A = np.stack(rates.V[1:], axis=1), accelerations(tree, poses, rates, a)
+    c, R = centres(bodies, poses), np.swapaxes(poses.R[1:], 0, 1)
+    V, A = np.swapaxes(rates.V[1:], 0, 1), accelerations(tree, poses, rates, a)
     w, alpha = V[..., 3:], A[..., 3:]
     vc = V[..., :3] + cross(w, c)
     ac = A[..., :3] + cross(alpha, c) + cross(w, vc)

@@ -93,7 +93,7 @@ def energy_balance(
     point = system.manifold.at(np.asarray(trajectory.q))
     tree = system.manifold.loops.tree
     bodies = Bodies.of(chain)
-    moving = body_rates(tree, bodies, point.poses, tree.rates(trajectory.q, v, point.poses), trajectory.a)
+    moving = body_rates(tree, bodies, point.poses, tree.rates(trajectory.q, v), trajectory.a)
     gravity = np.array(chain.model.gravity.linear)
     weight = gravity_wrenches(bodies, moving.centre, gravity)
     armature = np.array(chain.model.armature)

@@ -19,7 +19,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.chain import ClosedChain, frames_by_name
+from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.elastic import SpringForces, spring_forces
 from fivebar_pin.dynamics.mass import depth_first, mass_matrix
 from fivebar_pin.dynamics.wrenches import moved_to_origin
@@ -30,7 +30,6 @@ from fivebar_pin.mechanism.manifold import Manifold, manifold_of
 __all__ = ["STICKING", "EquationsOfMotion", "ReducedEquations", "Slip"]
 
 
-_FEW = 6  # up to here one Pinocchio call per sample beats the batch
 STICKING = 1e-10  # yield of joints that stick, as part of the largest, below which they hold each other [-]
 _MASSLESS = 1e-13  # smallest to largest eigenvalue of the reduced inertia below which it counts as singular [-]
 
@@ -125,7 +124,7 @@ class EquationsOfMotion:
             force = force + self.spring_forces(point, v).force
         held = np.zeros_like(v)
         if rank:
-            drift = self._drift(point, v) @ loops.reduce.T
+            drift = loops.drift(point.q, v) @ loops.reduce.T
             held = -point.independent.solve(drift, rank) * scale
         force = force - np.matmul(M, held[..., None])[..., 0]
         NT = np.swapaxes(N, 1, 2)
@@ -146,30 +145,6 @@ class EquationsOfMotion:
         N = point.independent.tangent(rank) * self.manifold.scale[:, None]
         NT = N.swapaxes(1, 2)
         return np.asarray((N @ _solve_inertia(NT @ M @ N, NT @ M @ v[None, :, None]))[0, :, 0])
-
-    def _drift(self, point: Configurations, v: Array) -> Array:
-        """Return the second rate of the closures at zero joint accelerations (n, m), the loops being closed."""
-        loops, n = self.manifold.loops, v.shape[0]
-        if n > _FEW or not all(c.by_points for c in self.chain.closures):
-            return loops.drift(point.pairs, loops.tree.rates(point.q, v, point.poses))
-        model, data, out, still = self.chain.model, self.data, np.empty((n, loops.m)), np.zeros(self.chain.nv)
-        for i in range(n):
-            pin.forwardKinematics(model, data, point.q[i], v[i], still)
-            for k, (first, second) in enumerate(self._frames):
-                a1, a2 = (
-                    pin.getFrameClassicalAcceleration(model, data, f, pin.LOCAL_WORLD_ALIGNED).linear
-                    for f in (first, second)
-                )
-                out[i, 3 * k : 3 * k + 3] = (a2 - a1) @ point.pairs[k].R1[i]
-        return out
-
-    @cached_property
-    def _frames(self) -> list[tuple[int, int]]:
-        """Frame numbers of every closure."""
-        model = self.chain.model
-        named = frames_by_name(model)
-        found = [[named[name] for name in c.ends] for c in self.chain.closures]
-        return [(model.getFrameId(f.name, f.type), model.getFrameId(g.name, g.type)) for f, g in found]
 
     def _mass_and_bias(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the mass matrix, armature included (n, nv, nv), and Coriolis plus gravity torques (n, nv)."""

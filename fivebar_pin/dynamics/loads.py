@@ -163,7 +163,7 @@ class Loads(Immutable):
     def _bodies(self) -> BodyRates:
         tree, q, v = loops_of(self.chain).tree, self.trajectory.q, self.trajectory.v
         poses = tree.poses(q)
-        return body_rates(tree, Bodies.of(self.chain), poses, tree.rates(q, v, poses), self.trajectory.a)
+        return body_rates(tree, Bodies.of(self.chain), poses, tree.rates(q, v), self.trajectory.a)
 
     def peak(self, quantity: str) -> float:
         """Return the largest size of a quantity over the samples, 0 where it is only round-off [its unit].

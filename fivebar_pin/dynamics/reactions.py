@@ -75,7 +75,7 @@ def reactions(
     loops = loops_of(chain)
     tree = loops.tree
     poses = tree.poses(trajectory.q)
-    rates = tree.rates(trajectory.q, trajectory.v, poses)
+    rates = tree.rates(trajectory.q, trajectory.v)
     bodies = Bodies.of(chain)
     moving = body_rates(tree, bodies, poses, rates, trajectory.a)
     gravity = gravity_wrenches(bodies, moving.centre, np.array(chain.model.gravity.linear))
@@ -88,7 +88,7 @@ def reactions(
     slack = _carried(chain, loops, np.zeros((*forces.free.shape[:2], *carried.shape[1:])), forces.free)
     unit = np.r_[np.ones(3), np.full(3, chain.length)]
     closure = _seen(forces.wrench, forces.free, forces.point, forces.axes, unit)
-    joint = _seen(carried, slack, np.stack(poses.p[1:], axis=1), np.stack(poses.R[1:], axis=1), unit)
+    joint = _seen(carried, slack, np.swapaxes(poses.p[1:], 0, 1), np.swapaxes(poses.R[1:], 0, 1), unit)
     return Reactions(
         forces.multipliers,
         forces.determinate_rows,
@@ -125,8 +125,8 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
         mismatch = float(np.abs(unbalanced).max(initial=0.0))
         axes, rows = np.zeros((n, 0, 3, 3)), np.zeros((n, 0), dtype=np.bool_)
         return _ClosureForces(np.zeros((n, 0)), rows, none, none[:, None], none[..., :3], axes, mismatch)
-    pairs = loops.pairs(poses)
-    J = loops.jacobian(poses, pairs)
+    seen = loops.see(poses.q)
+    J = seen.J
     decomposed = Decomposed.of(loops.scaled(J))
     ranks = decomposed.ranks
     multipliers = decomposed.carry(unbalanced * loops.column_scale, ranks) * loops.row_scale
@@ -135,11 +135,11 @@ def _closure_forces(loops: Loops, poses: Poses, unbalanced: Array) -> _ClosureFo
     determinate_rows.setflags(write=False)
     null = free_rows * loops.row_scale * loops.length  # (n, k, m)
     wrench, free = [], []
-    for anchored, pair in zip(loops.anchored, pairs, strict=True):
-        T = anchored.selector(pair)
+    for anchored in loops.anchored:
+        T = seen.T[:, anchored.rows]
         wrench.append(np.einsum("nmi,nm->ni", T, multipliers[:, anchored.rows]))
         free.append(np.einsum("nmi,nkm->nki", T, null[:, :, anchored.rows]))
-    places = [anchored.place(pair) for anchored, pair in zip(loops.anchored, pairs, strict=True)]
+    places = [anchored.place(seen.pair(k)) for k, anchored in enumerate(loops.anchored)]
     return _ClosureForces(
         frozen(multipliers),
         determinate_rows,

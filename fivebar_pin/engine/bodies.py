@@ -31,7 +31,6 @@ from fivebar_pin.engine.tables import (
     FORCE,
     FRICTION,
     GRAVITY,
-    HELIX,
     JOINT,
     LINEAR,
     LINK_SIZE,
@@ -64,6 +63,7 @@ from fivebar_pin.engine.tables import (
     SHAKING,
     SHIFT,
     TAU,
+    TURN,
     TWIST,
     V_HERE,
     WIDTH,
@@ -102,12 +102,10 @@ def twists(I: Integers, W: Array) -> None:
             c, N = I[j + COLUMN0], I[N_HERE] + I[j + V] * I[NA] + a
             for _ in range(I[j + DOF]):
                 axis = scaled(W[N], axis_at(W, I[c + AXIS]))
-                if I[c + MOTION] == SHIFT:
-                    v = add(v, axis)
-                else:
+                if I[c + MOTION] != SHIFT:
                     omega = add(omega, axis)
-                    if I[c + MOTION] == HELIX:
-                        v = add(v, scaled(W[I[c + PITCH]], axis))
+                if I[c + MOTION] != TURN:
+                    v = add(v, scaled(W[I[c + PITCH]], axis))
                 c, N = c + COLUMN_SIZE, N + I[NA]
             put(W, here + ANGULAR, omega)
             put(W, here + LINEAR, v)
@@ -205,12 +203,10 @@ def joint_forces(I: Integers, W: Array) -> None:
         c = I[j + COLUMN0]
         for k in range(I[JOINT] + I[j + V], I[JOINT] + I[j + V] + I[j + DOF]):
             axis = axis_at(W, I[c + AXIS])
-            if I[c + MOTION] == SHIFT:
-                W[k] += dot(axis, f)
-            else:
+            if I[c + MOTION] != SHIFT:
                 W[k] += dot(axis, n)
-                if I[c + MOTION] == HELIX:
-                    W[k] += W[I[c + PITCH]] * dot(axis, f)
+            if I[c + MOTION] != TURN:
+                W[k] += W[I[c + PITCH]] * dot(axis, f)
             c += COLUMN_SIZE
         r = sub(vector_at(W, I[j + POSE] + ORIGIN), vector_at(W, I[j + PARENT_POSE] + ORIGIN))
         push(W, I[j + PARENT_LOAD] + FORCE, f)

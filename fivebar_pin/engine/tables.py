@@ -17,7 +17,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Integers"]
+__all__ = ["Integers", "unwritten"]
 
 Integers: TypeAlias = npt.NDArray[np.int64]
 
@@ -76,7 +76,7 @@ SPRING_SIZE = 8
 BETWEEN, AT_JOINT, AT_TURNING = range(3)
 
 # Numbers in W.
-ROTATION, ORIGIN, LEADING = 0, 9, 12  # of a pose, of a placement; LEADING: the lead of a screw
+ROTATION, ORIGIN, LEADING = 0, 9, 12  # of a pose, of a placement; LEADING: how far a screw or a slide goes in a unit
 MASS_CENTRE, MOMENTS = 1, 4  # of a mass; moments xx, xy, yy, xz, yz, zz about the centre
 ARMATURE, DAMPING, FRICTION = range(3)  # of losses
 SECOND_FRAME = 12  # of frames
@@ -85,3 +85,10 @@ POINT_B, STIFFNESS, REST, DAMPER, TOGETHER = 3, 6, 7, 8, 9  # of a coil
 OMEGA, VELOCITY, ALPHA, ACCELERATION = 0, 3, 6, 9  # of a rate: of the origin of the link, world axes
 FORCE, MOMENT, POINT = 0, 3, 6  # of a load, about the origin of the link, and of the wrench of a row, at a point
 ANGULAR, LINEAR = 0, 3  # of a twist
+
+
+def unwritten(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return an array as entries take those that they read: one layout, read-only, so that they are compiled once."""
+    given = np.ascontiguousarray(x).view()
+    given.setflags(write=False)
+    return given

@@ -27,7 +27,6 @@ from fivebar_pin.engine.tables import (
     DOF,
     FIXED,
     FREE,
-    HELIX,
     KIND,
     LEADING,
     LINK_SIZE,
@@ -94,7 +93,7 @@ def place(I: Integers, W: Array) -> None:
         elif kind == TURNING:
             R = turned_about_z(R, W[k], W[k + 1])
         elif kind == SLIDE:
-            p = add(p, times(R, (0.0, 0.0, W[k])))
+            p = add(p, times(R, (0.0, 0.0, W[fixed + LEADING] * W[k])))
         elif kind == SCREW:
             p = add(p, times(R, (0.0, 0.0, W[fixed + LEADING] * W[k])))
             R = turned_about_z(R, cos(W[k]), sin(W[k]))
@@ -144,12 +143,10 @@ def own(I: Integers, W: Array, j: int, rates: int) -> tuple[Vector, Vector]:
     c = I[j + COLUMN0]
     for k in range(rates + I[j + V], rates + I[j + V] + I[j + DOF]):
         axis = scaled(W[k], axis_at(W, I[c + AXIS]))
-        if I[c + MOTION] == SHIFT:
-            sliding = add(sliding, axis)
-        else:
+        if I[c + MOTION] != SHIFT:
             turning = add(turning, axis)
-            if I[c + MOTION] == HELIX:
-                sliding = add(sliding, scaled(W[I[c + PITCH]], axis))
+        if I[c + MOTION] != TURN:
+            sliding = add(sliding, scaled(W[I[c + PITCH]], axis))
         c += COLUMN_SIZE
     return turning, sliding
 
@@ -159,8 +156,8 @@ def power(W: Array, motion: int, axis: int, centre: int, pitch: int, f: Vector, 
     """Return the power, at unit velocity of a column, of a force f at a point and a moment m on what it moves."""
     e = axis_at(W, axis)
     turning = dot(e, add(m, cross(sub(point, vector_at(W, centre)), f)))
-    sliding = dot(e, f)
-    return turning if motion == TURN else sliding if motion == SHIFT else turning + W[pitch] * sliding
+    sliding = W[pitch] * dot(e, f)
+    return turning if motion == TURN else sliding if motion == SHIFT else turning + sliding
 
 
 @compiled
@@ -254,3 +251,6 @@ def _fly(W: Array, k: int, u: Vector, phi: Vector) -> None:
     d = add(add(u, scaled(0.5 * half * half, across)), scaled(third, cross(phi, across)))
     put(W, k, add(vector_at(W, k), times(_of_quaternion(W, k + 3), d)))
     _turn_quaternion(W, k + 3, phi)
+    if cos(0.5 * angle) < 0.0:  # of the two quaternions Pinocchio takes the one near that before
+        for i in range(k + 3, k + 7):
+            W[i] = -W[i]

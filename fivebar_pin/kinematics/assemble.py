@@ -119,7 +119,7 @@ def assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -
 
 def _opposed(loops: Loops, q: Array) -> bool:
     """Tell whether a hinge of q (1, nq) is closed with its axes against each other."""
-    return loops.may_oppose and bool(loops.opposed(loops.pairs(loops.tree.poses(q)))[0])
+    return loops.may_oppose and bool(loops.opposed(loops.see(q))[0])
 
 
 def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:
@@ -127,7 +127,7 @@ def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:
     for starts in (q, _nudged(loops, q, x)):  # a search that starts at a saddle stays there: step aside
         found = search(loops, starts)
         closed = polish(loops, found)
-        opposed = loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
+        opposed = loops.opposed(loops.see(closed.q))
         good = np.flatnonzero(closed_enough(loops, closed.residual, tolerance) & ~opposed)
         if good.size:
             away = loops.tree.difference(q, closed.q[good]) / loops.column_scale
@@ -177,7 +177,7 @@ def closed_from_starts(
     found = search(loops, q)
     closed = polish(loops, found)
     good = closed_enough(loops, closed.residual, tolerance)
-    good &= ~loops.opposed(loops.pairs(loops.tree.poses(closed.q)))
+    good &= ~loops.opposed(loops.see(closed.q))
     return closed.q[good], _smallest(residual_of(loops, found))
 
 

@@ -55,7 +55,7 @@ def frame_motion(chain: ClosedChain, trajectory: Trajectory, frame: str) -> Fram
     found = find_frame(chain.model, frame)
     tree, j = loops_of(chain).tree, int(found.parentJoint)
     poses = tree.poses(trajectory.q)
-    rates = tree.rates(trajectory.q, trajectory.v, poses)
+    rates = tree.rates(trajectory.q, trajectory.v)
     p = poses.p[j] + np.matmul(poses.R[j], np.array(found.placement.translation))
     A = rates.A[j] + np.matmul(poses.S * tree.support[j], trajectory.a[..., None])[..., 0]
     w, alpha = rates.V[j][:, 3:], A[:, 3:]

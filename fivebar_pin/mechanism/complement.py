@@ -45,8 +45,7 @@ def rates_of(here: Configurations, va: Array, aa: Array) -> tuple[Array, Array, 
     v = np.matmul(N, va[..., None])[..., 0]
     a = np.matmul(N, aa[..., None])[..., 0]
     if loops.m:
-        rates = loops.tree.rates(here.q, v, here.poses)
-        a[:, loops.passive] -= here.passive.solve(loops.drift(here.pairs, rates))
+        a[:, loops.passive] -= here.passive.solve(loops.drift(here.q, v))
     return v, a, N
 
 

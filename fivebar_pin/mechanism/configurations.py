@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fivebar_pin._arrays import Array, lazy
-from fivebar_pin.mechanism.loops import Loops
+from fivebar_pin.mechanism.loops import Loops, Seen
 from fivebar_pin.mechanism.passive import PassiveMap
 from fivebar_pin.mechanism.rank import Decomposed, Factored, factored
 from fivebar_pin.mechanism.tree import Poses
@@ -34,14 +33,14 @@ class Configurations:
         return self.loops.tree.poses(self.q)
 
     @lazy
-    def pairs(self) -> list[Any]:
-        """World poses of the frames of every closure."""
-        return self.loops.pairs(self.poses)
+    def seen(self) -> Seen:
+        """What the closures are there."""
+        return self.loops.see(self.q)
 
-    @lazy
+    @property
     def residual(self) -> Array:
         """All closure rows (n, m) [m, rad]."""
-        return self.loops.residual(self.pairs) if self.loops.m else np.zeros((self.q.shape[0], 0))
+        return self.seen.residual
 
     @lazy
     def gap(self) -> Array:
@@ -53,15 +52,15 @@ class Configurations:
         """Independent combinations of the closure rows, scaled (n, r)."""
         return np.asarray(self.residual @ self.loops.reduce.T)
 
+    @property
+    def J(self) -> Array:
+        """The closure Jacobian (n, m, nv)."""
+        return self.seen.J
+
     @lazy
     def blocks(self) -> list[Array]:
         """The closure Jacobian per independent group of closures."""
-        return self.loops.blocks(self.poses, self.pairs)
-
-    @lazy
-    def J(self) -> Array:
-        """The closure Jacobian (n, m, nv)."""
-        return self.loops.joined(self.blocks, self.q.shape[0])
+        return self.loops.blocks(self.J)
 
     @lazy
     def passive(self) -> PassiveMap:

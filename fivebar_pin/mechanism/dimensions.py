@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,22 +33,22 @@ class Dimensions:
     masses: Mapping[int, Array]
 
 
-def dimensions_of(chain: ClosedChain) -> Dimensions:
-    """Return those of a chain as it is."""
-    model = chain.model
-    names = {f for c in chain.closures if isinstance(c, FrameClosure) for f in c.frames}
-    names |= {f for s in chain.springs if isinstance(s, Spring) for f in (s.frame1, s.frame2)}
-    frames = frames_by_name(model) if names else {}
+def dimensions_of(model: pin.Model, names: Iterable[str]) -> Dimensions:
+    """Return those of one design as it is; the names are of the frames that closures and springs are at."""
+    wanted = dict.fromkeys(names)
+    frames = frames_by_name(model) if wanted else {}
     return Dimensions(
         {j: _pose(model.jointPlacements[j]) for j in range(1, model.njoints)},
-        {name: _pose(frames[name].placement) for name in names},
+        {name: _pose(frames[name].placement) for name in wanted},
         {j: row_of(model.inertias[j])[None] for j in range(1, model.njoints)},
     )
 
 
 def with_values(chain: ClosedChain, values: Mapping[str, Array]) -> Dimensions:
     """Return those of n designs of a chain, from values (n,) of all its named parameters."""
-    present, shapes = dimensions_of(chain), shapes_of(chain.model, chain.geometry, values)
+    names = [f for c in chain.closures if isinstance(c, FrameClosure) for f in c.frames]
+    names += [f for s in chain.springs if isinstance(s, Spring) for f in (s.frame1, s.frame2)]
+    present, shapes = dimensions_of(chain.model, names), shapes_of(chain.model, chain.geometry, values)
     frames = {name: shapes.frames.get(name, pose) for name, pose in present.frames.items()}
     return Dimensions({**present.joints, **shapes.joints}, frames, {**present.masses, **shapes.masses})
 

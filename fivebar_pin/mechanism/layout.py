@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.chain import ClosedChain, find_frame
+from fivebar_pin.chain import find_frame
 from fivebar_pin.chain.masses import turned
 from fivebar_pin.closures.anchored import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
 from fivebar_pin.engine import tables as e
-from fivebar_pin.mechanism.dimensions import Dimensions
+from fivebar_pin.mechanism.dimensions import Dimensions, dimensions_of
 from fivebar_pin.mechanism.links import Link
 from fivebar_pin.springs import JointSpring, Spring
 
@@ -118,6 +120,23 @@ def blocks_of(
     return found
 
 
+class Described(Protocol):
+    """What is asked of a chain, see `ClosedChain`."""
+
+    @property
+    def model(self) -> pin.Model: ...
+    @property
+    def nq(self) -> int: ...
+    @property
+    def nv(self) -> int: ...
+    @property
+    def na(self) -> int: ...
+    @property
+    def actuated_index(self) -> Index: ...
+    @property
+    def springs(self) -> Sequence[Spring | JointSpring]: ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
     """What the tables of a chain are made of.
@@ -128,22 +147,22 @@ class Parts:
         anchored: closures with their frames found.
         rows: of every closure between frames, what is kept of its rows.
         blocks: in order.
-        left: of every closure, combinations of its rows that say nothing anywhere.
         scale: unit of every velocity (nv,).
         length: of the chain [m].
-        dimensions: of one design or of many.
+        left: of every closure, combinations of its rows that say nothing anywhere, where they are known.
+        dimensions: of other designs, one or many, in place of its own.
         bodiless: whether bodies that weigh nothing get a place as well: in other designs they may be some.
     """
 
-    chain: ClosedChain
+    chain: Described
     links: Sequence[Link]
     anchored: Sequence[Anchored]
     rows: Sequence[Sequence[Row]]
     blocks: Sequence[Block]
-    left: Sequence[Sequence[Row]]
     scale: Array
     length: float
-    dimensions: Dimensions
+    left: Sequence[Sequence[Row]] = ()
+    dimensions: Dimensions | None = None
     bodiless: bool = False
 
 
@@ -173,6 +192,14 @@ class _Layout:
         self.filled = 0
         self.last = {0: 0, **{x.joint: j for j, x in enumerate(parts.links, start=1)}}  # link of a joint's body
         self.axes = {0: np.eye(3), **{x.joint: x.axes for x in parts.links}}
+        self.dimensions = parts.dimensions or dimensions_of(self.model, self._frame_names())
+
+    def _frame_names(self) -> Iterator[str]:
+        """Yield the frames that closures and springs are at."""
+        for anchored in self.parts.anchored:
+            yield from anchored.closure.frames if isinstance(anchored, AnchoredFrames) else ()
+        for one in self.parts.chain.springs:
+            yield from (one.frame1, one.frame2) if isinstance(one, Spring) else ()
 
     def vectors(self) -> tuple[e.Integers, Array]:
         chain = self.parts.chain
@@ -253,13 +280,13 @@ class _Layout:
         """Return axes and origin on its parent, and pitch, of a link (n, 13)."""
         R, p = x.R[None], x.p[None]
         if x.first:
-            R, p = x.placed(self.axes[int(self.model.parents[x.joint])], self.parts.dimensions.joints[x.joint])
+            R, p = x.placed(self.axes[int(self.model.parents[x.joint])], self.dimensions.joints[x.joint])
         return np.concatenate([R.reshape(-1, 9), p, np.full((len(p), 1), x.pitch)], axis=1)
 
     def _mass(self, j: int) -> int:
         """Return the place of mass, mass centre and moments about it in the axes of a link, or -1 where it has none."""
         joint, axes = self.parts.links[j - 1].joint, self.parts.links[j - 1].axes
-        rows = self.parts.dimensions.masses[joint]
+        rows = self.dimensions.masses[joint]
         if self.last[joint] != j or not (self.parts.bodiless or rows[:, 0].any() or rows[:, 4:].any()):
             return -1
         return self._put_each(turned(rows, axes))
@@ -276,7 +303,7 @@ class _Layout:
 
     def _frame(self, joint: int, name: str) -> tuple[Array, Array]:
         """Return axes (n, 3, 3) and origin (n, 3) of a frame on the link of a joint."""
-        M, back = self.parts.dimensions.frames[name], self.axes[joint].T
+        M, back = self.dimensions.frames[name], self.axes[joint].T
         return np.matmul(back, M[:, :3, :3]), np.matmul(back, M[:, :3, 3, None])[..., 0]
 
     def _directions(self, anchored: Anchored, rows: Sequence[Row]) -> list[list[float]]:

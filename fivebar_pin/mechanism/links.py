@@ -29,7 +29,8 @@ class Link:
         q, v: its first places in a configuration and in a velocity.
         R, p: its axes (3, 3) and origin (3,) on the parent, coordinates zero.
         axes: the same axes in those of the model's joint (3, 3): the body's are `R @ axes.T`.
-        pitch: lead of a screw [m/rad].
+        pitch: how far the joint slides for a unit of its coordinate: the lead of a screw [m/rad], one for slides unless
+            their axis has another length.
         columns: axis and motion of every velocity coordinate.
         within: pose (4, 4) on the joint's placement, or on the link of the same joint before.
         first: whether it is the first link of its joint.
@@ -61,10 +62,10 @@ class _Part:
     kind: int
     placement: pin.SE3
     axis: Array  # in its own axes
-    pitch: float = 0.0
+    pitch: float = 1.0
 
 
-_TURN, _SHIFT, _TWIST = ((2, motion) for motion in (e.TURN, e.SHIFT, e.TWIST))
+_TURN, _SHIFT, _TWIST = ((2, motion) for motion in (e.TURN, e.SHIFT, e.HELIX))
 _COLUMNS: dict[int, tuple[tuple[int, int], ...]] = {
     e.REVOLUTE: (_TURN,),
     e.TURNING: (_TURN,),
@@ -118,7 +119,7 @@ def _parts(model: pin.Model, joint: pin.JointModel) -> Iterator[_Part]:
     linear, angular = S[:3], S[3:]
     if name == "JointModelTranslation":
         for k in range(3):
-            yield _Part(e.SLIDE, here, linear[:, k])
+            yield _slide(linear[:, k])
     elif name == "JointModelSphericalZYX":
         for axis in np.eye(3)[::-1]:
             yield _Part(e.REVOLUTE, here, axis)
@@ -126,7 +127,7 @@ def _parts(model: pin.Model, joint: pin.JointModel) -> Iterator[_Part]:
         for k in range(2):
             yield _Part(e.REVOLUTE, here, angular[:, k])
     elif joint.nv == 1 and not angular.any():
-        yield _Part(e.SLIDE, here, linear[:, 0])
+        yield _slide(linear[:, 0])
     elif joint.nv == 1 and linear.any():
         yield _Part(e.SCREW, here, angular[:, 0], float(linear[:, 0] @ angular[:, 0]))
     elif joint.nv == 1:
@@ -138,6 +139,11 @@ def _parts(model: pin.Model, joint: pin.JointModel) -> Iterator[_Part]:
         )  # fmt: skip
 
 
+def _slide(axis: Array) -> _Part:
+    size = float(np.linalg.norm(axis))
+    return _Part(e.SLIDE, pin.SE3.Identity(), axis / size, size)
+
+
 def _subspace(model: pin.Model, joint: pin.JointModel) -> Array:
     """Return the motion subspace of a joint at its neutral configuration (6, nv)."""
     data = joint.createData()
@@ -147,9 +153,8 @@ def _subspace(model: pin.Model, joint: pin.JointModel) -> Array:
 
 def _to_z(axis: Array) -> Array:
     """Return axes (3, 3) whose z is a unit vector; those of coordinate axes come without round-off."""
-    aligned = np.flatnonzero(axis == 1.0)
-    if aligned.size:
-        return np.roll(np.eye(3), -(2 - int(aligned[0])), axis=0)
+    if np.array_equal(np.sort(axis), [0.0, 0.0, 1.0]):
+        return np.roll(np.eye(3), -(2 - int(np.argmax(axis))), axis=0)
     x = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(axis, x), axis], axis=1)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,18 +13,45 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.closures import Anchored
+from fivebar_pin.closures.anchored import FramePair
+from fivebar_pin.closures.frame_closure import AnchoredFrames
+from fivebar_pin.engine.tables import unwritten
 from fivebar_pin.errors import AssemblyError, InvalidInputError
+from fivebar_pin.mechanism.layout import Parts, layout_of
+from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.passive import Group, PassiveMap, passive_map
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.rank import ranks_of, singular_values
-from fivebar_pin.mechanism.tree import Poses, Rates, Tree
+from fivebar_pin.mechanism.tree import Tree
 
-__all__ = ["Loops", "loops_of", "open_message"]
+__all__ = ["Loops", "Seen", "loops_of", "open_message"]
 
 
 _Index = npt.NDArray[np.intp] | slice
 
 _GENERIC_SAMPLES = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What closures are at n configurations.
+
+    Attributes:
+        residual: all rows (n, m) [m, rad].
+        J: closure Jacobian (n, m, nv): residual rate = J v.
+        T: wrench on body 2 of a unit force in every row, its opposite on body 1, world origin (n, m, 6).
+        frames: of every closure R_1, p_1, R_2, p_2, row by row (n, closures, 24).
+    """
+
+    residual: Array
+    J: Array
+    T: Array
+    frames: Array
+
+    def pair(self, k: int) -> FramePair:
+        """Return the frames of a closure; unmoved ones where it has none."""
+        one, two = self.frames[:, k, :12], self.frames[:, k, 12:]
+        return FramePair(one[:, :9].reshape(-1, 3, 3), one[:, 9:], two[:, :9].reshape(-1, 3, 3), two[:, 9:])
 
 
 class Loops:
@@ -56,6 +84,9 @@ class Loops:
         self.row_scale = np.concatenate(scales or [np.zeros(0)])
         tied = [closure.ends == () for closure in self.closures for _ in closure.row_names]
         self.unit = np.where(np.array(tied, dtype=np.bool_), self.row_scale, 1.0)
+        rows = [c.closure.rows if isinstance(c, AnchoredFrames) else () for c in self.anchored]
+        parts = Parts(chain, links_of(model), self.anchored, rows, (), self.column_scale, 1.0)
+        (self._I, self._W), self._threads = layout_of(parts), threading.local()
         self._groups = [self._group(members) for members in self._members()]
         self.reduce = np.zeros((sum(g.reduce.shape[0] for g in self._groups), self.m))
         done = 0
@@ -91,47 +122,46 @@ class Loops:
         for column, k in enumerate(self.actuated):
             self.tree.set_coordinate(q, int(k), np.broadcast_to(x[..., column], q.shape[:1]))
 
-    def pairs(self, poses: Poses) -> list[Any]:
-        """Return what every closure sees of the configurations: the world poses of its frames, or its coordinates."""
-        return [c.look(poses) for c in self.anchored]
+    def see(self, q: Array) -> Seen:
+        """Return what the closures are at configurations q (n, nq)."""
+        from fivebar_pin.engine.batches import closures
 
-    def residual(self, pairs: list[Any]) -> Array:
-        """Return all closure rows (n, m) [m, rad]; the chain has closures."""
-        return np.concatenate([c.residual(x) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
+        n, m = q.shape[0], self.m
+        seen = Seen(np.empty((n, m)), np.zeros((n, m, self.tree.nv)), np.zeros((n, m, 6)), self._frames(n))
+        closures(self._I, self._memory(), unwritten(q), seen.residual, seen.J, seen.T, seen.frames)
+        return seen
 
-    def jacobian(self, poses: Poses, pairs: list[Any]) -> Array:
-        """Return the closure Jacobian J (n, m, nv): residual rate = J v."""
-        return self.joined(self.blocks(poses, pairs), poses.S.shape[0])
+    def _frames(self, n: int) -> Array:
+        """Return room for the frames of closures, unmoved where there are none."""
+        unmoved = np.r_[np.eye(3).ravel(), np.zeros(3)]
+        return np.tile(unmoved, (n, len(self.anchored), 2))
 
-    def joined(self, blocks: list[Array], n: int) -> Array:
-        """Return the closure Jacobian (n, m, nv) from its blocks."""
-        J = np.zeros((n, self.m, self.tree.nv))
-        for g, block in zip(self._groups, blocks, strict=True):
-            J[:, g.rows[:, None], g.columns] = block
-        return J
+    def _memory(self) -> Array:
+        """Return the working memory of this thread."""
+        if not hasattr(self._threads, "W"):
+            self._threads.W = np.array(self._W)
+        found: Array = self._threads.W
+        return found
 
-    def blocks(self, poses: Poses, pairs: list[Any]) -> list[Array]:
-        """Return the same per independent group of closures, without the zeros."""
-        return [self._block(g.members, g.columns, poses, pairs) for g in self._groups]
+    def blocks(self, J: Array) -> list[Array]:
+        """Return a closure Jacobian (n, m, nv) per independent group of closures, without the zeros."""
+        return [J[:, g.rows[:, None], g.columns] for g in self._groups]
 
-    def _block(self, members: tuple[int, ...], columns: npt.NDArray[np.intp], poses: Poses, pairs: list[Any]) -> Array:
-        """Return the rows of some closures in some columns (n, rows, columns)."""
-        closures = [self.anchored[k] for k in members]
-        sizes = [c.rows.stop - c.rows.start for c in closures]
-        block, start = np.zeros((poses.S.shape[0], sum(sizes), columns.size)), 0
-        for k, c, size in zip(members, closures, sizes, strict=True):
-            block[:, start : start + size, np.searchsorted(columns, c.columns)] = c.jacobian(pairs[k], poses)
-            start += size
-        return block
+    def drift(self, q: Array, v: Array) -> Array:
+        """Return the second rate of the residual at zero joint accelerations (n, m); q (n, nq), v (n, nv).
 
-    def drift(self, pairs: list[Any], rates: Rates) -> Array:
-        """Return the second rate of the residual at zero joint accelerations (n, m)."""
-        return np.concatenate([c.drift(x, rates) for c, x in zip(self.anchored, pairs, strict=True)], axis=1)
+        That of rotation vectors holds where the closure is met.
+        """
+        from fivebar_pin.engine.batches import drift
 
-    def opposed(self, pairs: list[Any]) -> npt.NDArray[np.bool_]:
+        out = np.empty((q.shape[0], self.m))
+        drift(self._I, self._memory(), unwritten(q), unwritten(v), out)
+        return out
+
+    def opposed(self, seen: Seen) -> npt.NDArray[np.bool_]:
         """Return where some hinge closes with its axes against each other (n,)."""
-        flags = [c.opposed(x) for c, x in zip(self.anchored, pairs, strict=True)]
-        return np.asarray(np.any(flags, axis=0))
+        flags = [c.opposed(seen.pair(k)) for k, c in enumerate(self.anchored)]
+        return np.asarray(np.any(flags, axis=0)) if flags else np.zeros(seen.residual.shape[0], dtype=np.bool_)
 
     def passive_map(self, blocks: list[Array], n: int) -> PassiveMap:
         """Invert the passive columns of the Jacobian's blocks, see `passive.passive_map`."""
@@ -202,8 +232,7 @@ class Loops:
         self, members: tuple[int, ...], rows_: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
     ) -> Array:
         """Find the row combinations of some closures that are independent at generic configurations."""
-        poses, pairs = self._generic
-        J = self._block(members, columns, poses, pairs)
+        J = self._generic.J[:, rows_[:, None], columns]
         scale = self.row_scale[rows_]
         wide = np.concatenate(list(self.scaled(J, rows_, columns)), axis=1)
         U, s, _ = np.linalg.svd(wide, full_matrices=False)
@@ -221,8 +250,7 @@ class Loops:
     @property
     def generic_jacobians(self) -> list[Array]:
         """The Jacobians of all closures, in their columns, at some generic configurations (n, m, columns) each."""
-        poses, pairs = self._generic
-        return [c.jacobian(x, poses) for c, x in zip(self.anchored, pairs, strict=True)]
+        return [self._generic.J[:, c.rows][:, :, c.columns] for c in self.anchored]
 
     @property
     def may_oppose(self) -> bool:
@@ -234,18 +262,16 @@ class Loops:
         """What combinations of rows that no motion changes leave open, whatever the configuration [m, rad or -]."""
         if not self.m:
             return 0.0
-        _, pairs = self._generic
-        residual = self.residual(pairs)[0] * self.row_scale
+        residual = self._generic.residual[0] * self.row_scale
         Q, _ = np.linalg.qr((self.reduce / self.row_scale).T)
         return float(np.abs((residual - Q @ (Q.T @ residual)) / self.row_scale * self.unit).max())
 
     @cached_property
-    def _generic(self) -> tuple[Poses, list[Any]]:
+    def _generic(self) -> Seen:
         rng = np.random.default_rng(7)
         tangent = rng.uniform(-np.pi, np.pi, (_GENERIC_SAMPLES, self.tree.nv)) * self.column_scale
         q = self.tree.integrate(np.repeat(self._neutral[None], _GENERIC_SAMPLES, axis=0), tangent)
-        poses = self.tree.poses(q)
-        return poses, self.pairs(poses)
+        return self.see(q)
 
 
 @once_per_chain

@@ -66,7 +66,7 @@ def close_all(chain: ClosedChain, q: Array, tolerance: float) -> tuple[Array, Ar
         q[~good] = search(loops, q[~good])
     q = iterate(loops, q, _AllCoordinates(good), most=_NEWTON)
     found = Configurations(loops, q)
-    return q, np.where(loops.opposed(found.pairs), np.inf, found.gap)
+    return q, np.where(loops.opposed(found.seen), np.inf, found.gap)
 
 
 class _AllCoordinates:

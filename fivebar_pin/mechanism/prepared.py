@@ -13,7 +13,6 @@ from fivebar_pin.closures import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
 from fivebar_pin.engine.tables import NQ, Integers
-from fivebar_pin.mechanism.dimensions import dimensions_of
 from fivebar_pin.mechanism.layout import Index, Parts, blocks_of, joined_rows, layout_of
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.loops import Loops, loops_of
@@ -77,10 +76,9 @@ def parts_of(chain: ClosedChain) -> Parts:
         loops.anchored,
         [rows for rows, _, _ in kept],
         blocks_of(systems, touched, chain.actuated_index),
-        [left for _, left, _ in kept],
         loops.column_scale,
         loops.length,
-        dimensions_of(chain),
+        [left for _, left, _ in kept],
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, Immutable, seal
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.engine.tables import CONSTANTS, Integers
-from fivebar_pin.mechanism.dimensions import dimensions_of, with_inertias, with_values
+from fivebar_pin.mechanism.dimensions import with_inertias, with_values
 from fivebar_pin.mechanism.layout import Parts, constants_of, layout_of
 from fivebar_pin.mechanism.prepared import parts_of
 from fivebar_pin.motion import Motion
@@ -114,7 +114,7 @@ class Problem(Immutable):
             way = start + share * (end[:, None] - start)
             way[:, -1] = end
             values[name] = way.ravel()
-        dimensions = with_values(chain, values) if self.parameters else dimensions_of(chain)
+        dimensions = with_values(chain, values)
         if self.inertias is not None:
             dimensions = with_inertias(dimensions, np.repeat(self.inertias[k], knots, axis=0))
         C = constants_of(replace(self._parts, dimensions=dimensions))

@@ -101,7 +101,7 @@ def test_samples_are_closed_and_their_velocities_keep_them_so(make: object) -> N
     samples, loops = random_samples(chain, 60), loops_of(chain)
     assert len(samples) == 60
     assert np.abs(fb.closure_residual(chain, samples.q)).max() <= 1e-12 * max(1.0, chain.length)
-    rate = np.matmul(loops.jacobian(samples.poses, loops.pairs(samples.poses)), samples.N)
+    rate = np.matmul(loops.see(samples.poses.q).J, samples.N)
     assert np.abs(rate).max() < 1e-10 * max(1.0, chain.length)
     unit = samples.N / loops.column_scale[:, None]
     np.testing.assert_allclose(

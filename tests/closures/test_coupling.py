@@ -179,7 +179,7 @@ def path_of(chain: fb.ClosedChain, path: fb.Trajectory) -> fb.Trajectory:
 def _jacobian(chain: fb.ClosedChain, q: np.ndarray) -> np.ndarray:
     loops = loops_of(chain)
     poses = loops.tree.poses(q[None])
-    return loops.jacobian(poses, loops.pairs(poses))[0]
+    return loops.see(poses.q).J[0]
 
 
 def test_a_coupling_joins_the_loops_it_touches():

@@ -9,6 +9,7 @@ from tied_chains import planar_sliding, sliding_hinge
 
 import fivebar_pin as fb
 from fivebar_pin.closures import Cylindrical
+from fivebar_pin.closures.anchored import FramePair
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.loops import loops_of
 
@@ -82,24 +83,18 @@ def test_a_hinge_has_the_rows_of_a_sliding_one_and_one_more():
     closure = chain.closures[0]
     free = fb.ClosedChain(chain.model, (Cylindrical(closure.ends, closure.axis),), ("crank", "slide"))
     N = fb.complement(chain, q)
-    J = loops_of(free).jacobian(*_seen(free, q))[0]
+    J = loops_of(free).see(q[None]).J[0]
     assert np.abs(J @ N).max() < 1e-12
     assert fb.diagnose(free, q).mobility == fb.diagnose(chain, q).mobility + 1
-
-
-def _seen(chain, q):
-    loops = loops_of(chain)
-    poses = loops.tree.poses(q[None])
-    return poses, loops.pairs(poses)
 
 
 def test_axes_against_each_other_are_told_apart():
     chain, q = planar_sliding()
     loops = loops_of(chain)
-    pair = _seen(chain, q)[1][0]
-    turned = type(pair)(pair.R1, pair.p1, pair.R2 @ np.diag([1.0, -1.0, -1.0]), pair.p2)
-    assert np.abs(loops.residual([turned])).max() < 1e-12
-    assert (loops.opposed([pair])[0], loops.opposed([turned])[0]) == (False, True)
+    seen = loops.see(q[None])
+    pair = seen.pair(0)
+    turned = FramePair(pair.R1, pair.p1, pair.R2 @ np.diag([1.0, -1.0, -1.0]), pair.p2)
+    assert (loops.opposed(seen)[0], loops.anchored[0].opposed(turned)[0]) == (False, True)
 
 
 def test_the_axis_must_have_a_direction():

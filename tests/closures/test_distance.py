@@ -38,7 +38,7 @@ def test_a_mass_on_a_rod_is_a_pendulum():
     tension = MASS * (G * np.cos(theta) + LENGTH * rate**2)
     loops = loops_of(chain)
     poses = loops.tree.poses(q)
-    J = loops.jacobian(poses, loops.pairs(poses))
+    J = loops.see(poses.q).J
     path = fb.Trajectory(np.arange(30.0), q, v, a, np.zeros((30, 2, 0)), np.zeros(30))
     loads = fb.inverse_dynamics(chain, path)
     (rod,) = loads.multipliers.values()
@@ -89,7 +89,7 @@ def test_the_force_is_along_the_rod_and_every_component_is_determinate():
     path = fb.drive(chain, fb.motion.cycloidal(np.linspace(0.0, 1.0, 21), 0.3, 0.8), near=q)
     loads = fb.inverse_dynamics(chain, path)
     wrench = loads.closure_reactions[:, 0]
-    pair = loops_of(chain).pairs(loops_of(chain).tree.poses(path.q))[0]
+    pair = loops_of(chain).see(path.q).pair(0)
     u = (pair.p2 - pair.p1) / chain.closures[0].length
     size = loads.multipliers["one~two"]
     np.testing.assert_allclose(wrench[:, :3], size * u, rtol=0.0, atol=1e-11 * np.abs(size).max())
@@ -121,10 +121,9 @@ def test_points_that_coincide_are_a_start_like_any_other():
     """A rod of no length has no direction; the search leaves it along the first axis and closes."""
     chain = pendulum()
     loops = loops_of(chain)
-    poses = loops.tree.poses(np.zeros((1, 2)))
-    pairs = loops.pairs(poses)
-    np.testing.assert_array_equal(loops.residual(pairs), [[-LENGTH]])
-    np.testing.assert_array_equal(loops.jacobian(poses, pairs), [[[1.0, 0.0]]])
+    seen = loops.see(np.zeros((1, 2)))
+    np.testing.assert_array_equal(seen.residual, [[-LENGTH]])
+    np.testing.assert_array_equal(seen.J, [[[1.0, 0.0]]])
     assert fb.diagnose(chain).ok
     assert np.hypot(*fb.diagnose(chain).q) == pytest.approx(LENGTH, abs=1e-12)
 

@@ -32,7 +32,7 @@ def test_the_complement_spans_what_the_closures_allow(name):
     chain, path = moved(name)
     loops = loops_of(chain)
     poses = loops.tree.poses(path.q)
-    J = loops.jacobian(poses, loops.pairs(poses))
+    J = loops.see(poses.q).J
     assert path.closure_residual.max() < 1e-13
     assert np.abs(np.matmul(J, path.N)).max() < 1e-11 * np.abs(J).max()
     assert np.linalg.matrix_rank(path.N[0]) == chain.na == chain.nv - loops.rank(J[0])
@@ -88,11 +88,10 @@ def test_the_joints_carry_what_the_bodies_need(name):
     chain, path = moved(name)
     loads = fb.inverse_dynamics(chain, path)
     r, loops = loads.reactions, loops_of(chain)
-    poses = loops.tree.poses(path.q)
-    pairs = loops.pairs(poses)
+    seen = loops.see(path.q)
     need = np.array(r.bodies.rate - r.gravity)
-    for c, pair in zip(loops.anchored, pairs, strict=True):
-        on_second = np.einsum("nmi,nm->ni", c.selector(pair), r.multipliers[:, c.rows])
+    for c in loops.anchored:
+        on_second = np.einsum("nmi,nm->ni", seen.T[:, c.rows], r.multipliers[:, c.rows])
         for j, sign in zip(c.joints, (1.0, -1.0), strict=True):
             if j:
                 need[:, j - 1] += sign * on_second

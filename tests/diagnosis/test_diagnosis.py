@@ -101,7 +101,7 @@ def test_redundant_combinations_vanish(chain, mobility, rank, always, closed):
         weights = np.array([row.weights.get(n, 0.0) for n in names])
         places = everywhere if row.scope == "always" else d.q[None]
         poses = loops.tree.poses(places)
-        J = loops.row_scale[:, None] * loops.jacobian(poses, loops.pairs(poses)) * loops.column_scale
+        J = loops.row_scale[:, None] * loops.see(poses.q).J * loops.column_scale
         assert np.abs(np.einsum("m,nmk->nk", weights, J)).max() <= 1e-7
 
 

@@ -181,7 +181,7 @@ def test_torque_satisfies_the_equations_of_motion(loads, case):
     chain, trajectory = simple(loads[case])
     loops = loops_of(chain)
     poses = loops.tree.poses(trajectory.q)
-    J = loops.jacobian(poses, loops.pairs(poses))
+    J = loops.see(poses.q).J
     model, data = chain.model, chain.model.createData()
     b, f = np.array(model.damping), np.array(model.upperDryFrictionLimit)
     for i in range(0, len(trajectory), 5):

@@ -74,7 +74,7 @@ def drive(driven, chain, motion, near):
 def jacobian(chain: fb.ClosedChain, q: np.ndarray) -> np.ndarray:
     loops = loops_of(chain)
     poses = loops.tree.poses(q)
-    return loops.jacobian(poses, loops.pairs(poses))
+    return loops.see(poses.q).J
 
 
 @EACH

@@ -149,8 +149,7 @@ def test_the_chain_itself_has_the_constants_that_it_is_prepared_with():
 def side(chain: fb.ClosedChain, q: np.ndarray) -> float:
     """Return the sign of the determinant of the passive Jacobian, which tells the two assembly modes of a five-bar."""
     loops = loops_of(chain)
-    poses = loops.tree.poses(q[None])
-    J = loops.reduce @ loops.jacobian(poses, loops.pairs(poses))[0][:, loops.passive]
+    J = loops.reduce @ loops.see(q[None]).J[0][:, loops.passive]
     return float(np.sign(np.linalg.det(J) * np.linalg.det(loops.reduce[:, :2])))
 
 

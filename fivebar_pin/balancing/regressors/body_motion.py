@@ -48,8 +48,8 @@ class BodyMotion(Immutable):
         """Compute it from q (n, nq), v, a (n, nv); without a, the accelerations are zero (momentum only)."""
         tree = loops.tree
         poses = tree.poses(q) if poses is None else poses
-        rates = tree.rates(q, v, poses)
-        R, p, V = np.stack(poses.R[1:], axis=1), np.stack(poses.p[1:], axis=1), np.stack(rates.V[1:], axis=1)
+        rates = tree.rates(q, v)
+        R, p, V = np.swapaxes(poses.R[1:], 0, 1), np.swapaxes(poses.p[1:], 0, 1), np.swapaxes(rates.V[1:], 0, 1)
         w = V[..., 3:]
         u = V[..., :3] + cross(w, p)
         if a is None:

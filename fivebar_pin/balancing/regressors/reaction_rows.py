@@ -33,15 +33,14 @@ def reaction_matrices(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array
         joint[..., -1] -= body_wrenches(chain, loops, trajectory.v, state.poses)
     closure = np.zeros((n, len(chain.closures), 6, tau.shape[2]))
     if loops.m:
-        pairs = loops.pairs(state.poses)
-        multipliers = np.matmul(_multiplier_map(loops, loops.jacobian(state.poses, pairs)), tau)
-        for k, (anchored, pair) in enumerate(zip(loops.anchored, pairs, strict=True)):
-            T = anchored.selector(pair)
-            on_second = np.matmul(np.swapaxes(T, 1, 2), multipliers[:, anchored.rows])
+        seen = loops.see(state.poses.q)
+        multipliers = np.matmul(_multiplier_map(loops, seen.J), tau)
+        for k, anchored in enumerate(loops.anchored):
+            on_second = np.matmul(np.swapaxes(seen.T[:, anchored.rows], 1, 2), multipliers[:, anchored.rows])
             for j, sign in zip(anchored.joints, (1.0, -1.0), strict=True):
                 if j:
                     joint[:, j - 1] += sign * on_second
-            closure[:, k] = _at(on_second, anchored.place(pair)[0])
+            closure[:, k] = _at(on_second, anchored.place(seen.pair(k))[0])
     for j in range(nb, 0, -1):
         parent = int(chain.model.parents[j])
         if parent:
