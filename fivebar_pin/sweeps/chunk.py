@@ -78,12 +78,11 @@ class _Bench:
         from fivebar_pin.engine.sweeping import lead
 
         I, W, n = self.tables.I, self.W, len(self.gap)
-        W[:] = self.tables.W
+        W[:] = self.tables.W  # nothing of the design before is left
         self.q0[0] = self.problem.q0
         lead(I, W, self.tables.before, knots, self.q0)
         if W[I[STATUS]] != 0.0:
             return Status.OPEN, 0
-        self._begin(knots[-1])
         self.q[0] = self.q0[0]
         done = int(drive(I, W, self.q_a, self.v_a, self.a_a, self.q, self.v, self.a, self.N, self.gap))
         if done and self._leaves_the_plane(done - 1):
@@ -98,24 +97,17 @@ class _Bench:
         """Compute what moves a design, and tell whether all its springs have a direction."""
         from fivebar_pin.engine.entries import loads
 
-        self._begin(constants)
+        self.W[: constants.size] = constants
         I, (q, v, a, N), outside, about = self.tables.I, self.path, self.nothing, self.problem.about
         lost = loads(I, self.W, q, v, a, N, about, *outside, self.tau, self.shaking, self.carried, self.tree)
         return bool(lost < 0)
 
-    def _begin(self, constants: Array) -> None:
-        """Make the memory that of a design, as it is before the first sample: nothing of the one before is left."""
-        self.W[:] = self.tables.W
-        self.W[: constants.size] = constants
-
-    def _leaves_the_plane(self, last: int) -> bool:
+    def _leaves_the_plane(self, sample: int) -> bool:
         """Tell whether rows that say nothing of the chain say something of this design."""
         from fivebar_pin.engine.sweeping import left_open
 
         checks = self.tables.checks
-        if checks is None:
-            return False
-        return not all(left_open(checks, self.W, self.q, self.N, sample) <= _LEFT for sample in {0, last})
+        return checks is not None and not left_open(checks, self.W, self.q, self.N, sample) <= _LEFT
 
     def tell(self, series: dict[str, Array], i: int) -> None:
         """Write what was computed where it is wanted."""

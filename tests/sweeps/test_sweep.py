@@ -13,12 +13,14 @@ import fivebar_pin as fb
 from fivebar_pin.chain import Geometry, Placement
 from fivebar_pin.engine import tables as e
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
+from fivebar_pin.mechanism.dimensions import with_values
 from fivebar_pin.mechanism.layout import constants_of
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.prepared import parts_of, prepared_of
 from fivebar_pin.planar import Linkage
 from fivebar_pin.sweeps import Status, Sweep
-from fivebar_pin.sweeps.terms import QUANTITIES
+from fivebar_pin.sweeps.problem import Problem
+from fivebar_pin.sweeps.terms import QUANTITIES, terms_of
 from tests.chain.test_parameters import six_bar
 
 SAME = 1e-12
@@ -125,8 +127,6 @@ def test_a_sweep_is_the_loop_over_chains(name):
 @pytest.mark.parametrize("name", CHAINS)
 def test_designs_have_the_constants_of_their_chains_to_the_last_digit(name):
     """In units of the chain that they are designs of."""
-    from fivebar_pin.mechanism.dimensions import with_values
-
     chain, values = CHAINS[name](), designs(name)
     base = parts_of(chain)
     every = {k: np.broadcast_to(values.get(k, x), (5,)) for k, x in chain.parameters.items()}
@@ -137,6 +137,18 @@ def test_designs_have_the_constants_of_their_chains_to_the_last_digit(name):
         if name == "delta":  # whose rows are mixed: any mixture will do
             same = replace(same, blocks=base.blocks, rows=base.rows)
         np.testing.assert_array_equal(C[i], constants_of(same)[0])
+
+
+def test_the_last_point_of_the_way_to_a_design_is_the_design():
+    chain = CHAINS["delta"]()
+    rng = np.random.default_rng(2)
+    values = {"askew": rng.uniform(-1.0, 1.0, 50), "arm": rng.uniform(-0.05, 0.05, 50)}
+    nothing = (np.full(chain.nq, -np.inf), np.full(chain.nq, np.inf))
+    asked = (chain, home(chain), motion_of(chain), 50, values, None, terms_of("q"), np.zeros(3), nothing)
+    problem = Problem(*asked)
+    assert problem.knots > 5
+    C = constants_of(replace(parts_of(chain), bodiless=True, dimensions=with_values(chain, values)))
+    np.testing.assert_array_equal(problem.constants(slice(0, 50))[:, -1], C)
 
 
 def test_the_chain_itself_has_the_constants_that_it_is_prepared_with():
@@ -191,20 +203,45 @@ def test_what_cannot_be_assembled_or_followed_is_data():
             fb.drive(one, motion, near=fb.assemble(one, motion.q[0], near=home(chain)))
 
 
-def test_a_design_out_of_its_limits_says_so_unless_they_are_ignored():
-    chain = five_bar()
-    model = chain.model.copy()
+@pytest.mark.parametrize("side", ["upper", "lower"])
+def test_a_design_out_of_its_limits_says_so_unless_they_are_ignored(side):
+    chain, sign = five_bar(), 1.0 if side == "upper" else -1.0
+    model, values = chain.model.copy(), {"left": [0.15, 0.19]}
     place = chain.columns("left_rod")[0].start
-    q = fb.sweep(chain, motion_of(chain), parameters={"left": [0.15, 0.19]}, of="q")["q"][:, :, place]
-    high = np.array(model.upperPositionLimit)
-    high[place] = 0.5 * (q[0].max() + q[1].max())
-    model.upperPositionLimit = high
+    q = sign * fb.sweep(chain, motion_of(chain), parameters=values, of="q")["q"][:, :, place]
+    bound = 0.5 * (q[0].max() + q[1].max())
+    limit = np.array(getattr(model, f"{side}PositionLimit"))
+    limit[place] = sign * bound
+    setattr(model, f"{side}PositionLimit", limit)
     tight = replace(chain, model=model)
-    found = fb.sweep(tight, motion_of(chain), parameters={"left": [0.15, 0.19]})
+    found = fb.sweep(tight, motion_of(chain), parameters=values)
     assert sorted(found.status.tolist()) == [Status.OK, Status.LIMITS]
     bad = int(np.argmax(found.status))
-    assert found.reached[bad] == int(np.argmax(q[bad] > high[place]))
-    assert fb.sweep(tight, motion_of(chain), parameters={"left": [0.15, 0.19]}, limits="ignore").ok.all()
+    assert found.reached[bad] == int(np.argmax(q[bad] > bound))
+    assert fb.sweep(tight, motion_of(chain), parameters=values, limits="ignore").ok.all()
+
+
+def test_a_spring_whose_ends_meet_has_no_direction():
+    chain = five_bar()
+    sprung = chain.with_springs([fb.Spring("left_rod_P", "right_rod_P", 10.0, 0.1)])
+    assert (
+        fb.sweep(sprung, motion_of(chain), parameters={"left": [0.15, 0.16]}).status.tolist() == [Status.SINGULAR] * 2
+    )
+
+
+def test_a_placement_that_turns_once_takes_its_joints_along():
+    """The way goes round with it, by points in between; both ends look the same."""
+    chain = five_bar().with_parameters(left=0.05)
+    turned = placed(chain, {"left": [("turn", [0, 0, 0, 0, 0, 1.0])]}, turn=0.0)
+    found = fb.sweep(
+        turned, motion_of(chain, 3, 0.01), parameters={"turn": [0.0, 2.0 * np.pi]}, of="q", limits="ignore"
+    )
+    assert found.ok.all()
+    way = found["q"][1] - found["q"][0]
+    place = chain.columns("left_rod")[0].start
+    wanted = np.zeros_like(way)
+    wanted[:, place] = -2.0 * np.pi
+    np.testing.assert_allclose(way, wanted, rtol=0.0, atol=1e-12)
 
 
 def test_a_design_that_leaves_the_plane_is_told():
@@ -290,6 +327,14 @@ def test_threads_and_neighbours_change_no_digit():
     assert np.array_equal(mixed["rms_torque"], one["rms_torque"][order], equal_nan=True)
 
 
+def test_blocks_of_any_size_know_nothing_of_the_design_before():
+    chain = tilted_delta()
+    values = {"askew": np.linspace(-0.2, 0.2, 12), "arm": np.linspace(0.03, -0.03, 12)}
+    one = fb.sweep(chain, motion_of(chain), parameters=values, of="torque", near=home(chain))
+    back = fb.sweep(chain, motion_of(chain), parameters={k: x[::-1] for k, x in values.items()}, of="torque")
+    assert one.ok.all() and np.array_equal(one["torque"], back["torque"][::-1])
+
+
 def test_progress_tells_how_many_are_done():
     told: list[tuple[int, int]] = []
     fb.sweep(five_bar(), motion_of(five_bar(), 11), parameters=many(600), progress=lambda *x: told.append(x))
@@ -333,6 +378,7 @@ def test_a_sweep_is_short_to_look_at_and_its_arrays_are_read_only():
         ),
         ({"inertias": np.zeros((2, 3, 10))}, InvalidInputError, r"shape of inertias = .* must be \(n, 4, 10\)"),
         ({"inertias": -np.ones((1, 4, 10))}, InvalidInputError, "inertias of design 0, joint left .* is no body"),
+        ({"inertias": np.eye(10)[[1] * 4][None]}, InvalidInputError, "inertias of design 0, joint left .* is no body"),
         ({"threads": 0}, InvalidInputError, "threads = 0 but must be an integer of at least 1"),
         ({"limits": "loose"}, InvalidInputError, "limits = loose|limits = 'loose'"),
         ({"client": "tcp://"}, InvalidInputError, "client = .*dask.distributed"),
