@@ -12,6 +12,7 @@ import pytest
 import fivebar_pin as fb
 from fivebar_pin.chain import Geometry, Placement
 from fivebar_pin.engine import tables as e
+from fivebar_pin.engine.sweeping import lead
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.dimensions import with_values
 from fivebar_pin.mechanism.layout import constants_of
@@ -186,6 +187,21 @@ def test_every_design_stays_on_the_assembly_mode_of_the_chain(slack):
         for i in np.flatnonzero(found.ok):
             one = chain.with_parameters({k: float(x[i]) for k, x in values.items()})
             assert side(one, found["q"][i, 0]) == side(chain, q0)
+
+
+def test_between_knots_constants_go_straight_from_one_to_the_next():
+    """From almost stretched rods to slack ones and back, where steps have to be short again."""
+    chain = stretched(1e-4)
+    rods = chain.parameters["left_rod"] * np.array([1.5, 1.0 + 1e-6])
+    nothing = (np.full(chain.nq, -np.inf), np.full(chain.nq, np.inf))
+    q0 = fb.assemble(chain, home(chain)[chain.actuated_index], home(chain))
+    asked = (chain, q0, motion_of(chain), 2, {"left_rod": rods}, None, terms_of("q"), np.zeros(3), nothing)
+    problem = Problem(*asked)
+    I, W, q = problem.tables.I, np.array(problem.tables.W), q0[None].copy()
+    lead(I, W, problem.tables.before, problem.constants(slice(0, 2))[:, 0], q)
+    assert W[I[e.STATUS]] == 0.0
+    there = chain.with_parameters(left_rod=float(rods[1]))
+    assert np.abs(fb.closure_residual(there, q[0])).max() < 1e-14 and side(there, q[0]) == side(chain, q0)
 
 
 def test_what_cannot_be_assembled_or_followed_is_data():
@@ -411,3 +427,14 @@ def test_a_chain_read_from_its_file_is_swept_alike(name, tmp_path):
     one, other = (fb.sweep(c, motion_of(chain), parameters=values, of=EVERY, near=home(chain)) for c in (chain, read))
     for quantity in EVERY:
         np.testing.assert_allclose(other[quantity], one[quantity], rtol=0.0, atol=1e-9 * np.abs(one[quantity]).max())
+
+
+def test_a_motion_of_other_motors_is_refused():
+    with pytest.raises(InvalidInputError, match=r"motion columns = 1 but must be 2, one for each of left, right"):
+        fb.sweep(five_bar(), motion_of(slider()), parameters={"left": [0.15]})
+
+
+def test_numbers_beyond_what_can_be_computed_are_refused():
+    with pytest.raises(InvalidInputError, match=r"mean_square_power of design 0 = .* is beyond what can be computed"):
+        pi = 1e160 * five_bar().inertial_parameters[None]
+        fb.sweep(five_bar(), motion_of(five_bar()), inertias=pi, of="mean_square_power")
