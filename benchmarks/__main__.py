@@ -7,10 +7,10 @@ import argparse
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import foreign, ladder, mechanisms, roads, robot, scoring
+from benchmarks import foreign, ladder, mechanisms, roads, robot, scoring, sweeping
 from benchmarks.machine import machine
 
-PARTS = ("roads", "foreign", "mechanisms", "robot", "ladder", "assemblies", "scoring")
+PARTS = ("roads", "foreign", "mechanisms", "robot", "ladder", "assemblies", "scoring", "sweeping")
 
 
 def main() -> None:
@@ -19,6 +19,7 @@ def main() -> None:
     parser.add_argument("--which", nargs="+", choices=PARTS, default=PARTS)
     parser.add_argument("--assemblies", type=int, default=10000, help="random assemblies in all [10000]")
     parser.add_argument("--designs", type=int, default=1_000_000, help="mass distributions to score [1000000]")
+    parser.add_argument("--lengths", type=int, default=100_000, help="designs of other lengths to sweep [100000]")
     chosen = parser.parse_args()
     console = Console(width=150)
     console.print(machine())
@@ -45,6 +46,9 @@ def main() -> None:
         title = "Five-bar designs, RMS of shaking force, shaking moment and torques over 201 samples"
         _show(console, title, scoring.HEADINGS, scoring.rows(chosen.designs))
         _show(console, "Force balance of the five-bar solved again", scoring.SOLVES, scoring.solves())
+    if "sweeping" in chosen.which:
+        title = f"Five-bars of other lengths, {sweeping.SAMPLES} samples, torque and shaking wrench"
+        _show(console, title, sweeping.HEADINGS, sweeping.rows(chosen.lengths))
 
 
 def _show(console: Console, title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fivebar_pin import balancing, closures, io, motion, paper, planar, shipped, viz
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
-    from fivebar_pin.closures import Closure, ClosureKind
+    from fivebar_pin.closures import Closure
     from fivebar_pin.control import Evaluator
     from fivebar_pin.diagnosis import Diagnosis, diagnose
     from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics, reduced_dynamics
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     from fivebar_pin.planar.loading import load
     from fivebar_pin.simulation import simulate
     from fivebar_pin.springs import JointSpring, Spring
+    from fivebar_pin.sweeps import sweep
     from fivebar_pin.trajectory import Trajectory
 
 __all__ = [
     "BalanceConditions",
     "ClosedChain",
     "Closure",
-    "ClosureKind",
     "Design",
     "Diagnosis",
     "Evaluator",
@@ -77,6 +77,7 @@ __all__ = [
     "score",
     "shipped",
     "simulate",
+    "sweep",
     "viz",
 ]
 
@@ -97,6 +98,7 @@ _LATE = {
     "shipped": (),
     "simulation": ("simulate",),
     "springs": ("JointSpring", "Spring"),
+    "sweeps": ("sweep",),
     "trajectory": ("Trajectory",),
     "viz": (),
 }

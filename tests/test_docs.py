@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
-EXTENDING, CONTROL = DOCS / "extending.md", DOCS / "control.md"
+PAGES = ("control", "extending", "sweeps")  # whose sections run each by itself
 
 
 def sections(page: Path) -> dict[str, str]:
@@ -24,16 +24,14 @@ def sections(page: Path) -> dict[str, str]:
 
 
 def test_the_pages_have_their_sections():
-    assert "A closure kind" in sections(EXTENDING)
-    assert "Computed torque" in sections(CONTROL)
+    assert "A closure kind" in sections(DOCS / "extending.md")
+    assert "Computed torque" in sections(DOCS / "control.md")
 
 
-@pytest.mark.parametrize(
-    ("page", "heading"), [(page, heading) for page in (EXTENDING, CONTROL) for heading in sections(page)]
-)
+@pytest.mark.parametrize(("page", "heading"), [(p, h) for p in PAGES for h in sections(DOCS / f"{p}.md")])
 def test_every_section_runs_in_a_fresh_interpreter(page, heading, tmp_path):
     """Apart from each other and from the tests: what a section registers stays in its own process."""
-    code = sections(page)[heading]
+    code = sections(DOCS / f"{page}.md")[heading]
     command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr

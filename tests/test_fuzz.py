@@ -247,6 +247,8 @@ def calls() -> dict[str, Callable[..., object]]:
         "actuated": lambda x, y: chain.with_actuated(x),
         "diagnose": lambda x, y: fb.diagnose(chain, x, seed=y),
         "score": lambda x, y: fb.score(chain, path, x, about=y),
+        "sweep": lambda x, y: fb.sweep(chain, motion, inertias=x, of="rms_torque", about=y),
+        "sweep, asked": lambda x, y: fb.sweep(chain, motion, parameters=x, of=y),
         "regressor": lambda x, y: balancing.regressor(chain, path, "torque", about=x),
         "conditions": lambda x, y: fb.balance_conditions(chain, "force", samples=x, about=y),
         "regions": lambda x, y: (balancing.Ball(x, y), balancing.Box(x, y), balancing.Ellipsoid(x, y)),

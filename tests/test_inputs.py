@@ -110,7 +110,7 @@ def entries():
     chain, q, t, motion, path = case()
     linkage = paper.table_1("I", "unbalanced")
     one, v, wrench = np.array([0.5]), np.zeros(chain.nv), np.zeros(6)
-    moves = paper.default_motion(samples=11)
+    moves, pi = paper.default_motion(samples=11), chain.inertial_parameters[None]
     yield from {
         "assemble": (one, lambda x: fb.assemble(chain, x)),
         "assemble near": (q, lambda x: fb.assemble(chain, one, x)),
@@ -157,6 +157,8 @@ def entries():
         "visual": (np.ones(3), lambda x: fb.Visual("crank_body", "box", x)),
         "diagnose": (q, lambda x: fb.diagnose(chain, x)),
         "score": (chain.inertial_parameters, lambda x: fb.score(chain, path, x)),
+        "sweep": (chain.inertial_parameters[None], lambda x: fb.sweep(chain, motion, inertias=x, near=q)),
+        "sweep about": (np.zeros(3), lambda x: fb.sweep(chain, motion, inertias=pi, near=q, about=x)),
         "regressor about": (np.zeros(3), lambda x: balancing.regressor(chain, path, "shaking_moment", about=x)),
         "conditions about": (np.zeros(3), lambda x: fb.balance_conditions(chain, "force", about=x)),
         "ball": (np.array(0.1), lambda x: balancing.Ball(x)),

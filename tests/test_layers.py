@@ -26,7 +26,7 @@ ORDER = (
     ("engine",),
     ("mechanism",),
     ("kinematics", "dynamics"),
-    ("control", "simulation", "diagnosis", "balancing", "io", "paper"),
+    ("control", "simulation", "diagnosis", "balancing", "io", "paper", "sweeps"),
     ("shipped", "planar"),
     ("viz",),
     ("cli",),

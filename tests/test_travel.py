@@ -174,7 +174,8 @@ def specimens() -> tuple[object, ...]:
     design = fb.balance(five, "force", region=balancing.Ball(0.1), motions=[moved])
     none = fb.balance(five, "dynamic", region=balancing.Ball(0.1))
     front = fb.pareto(five, "force", "added_mass", "rms_torque", 2, region=balancing.Ball(0.1), motions=[moved])
-    score = fb.score(five, moved, np.stack([five.inertial_parameters] * 3))
+    bodies_of_three = np.stack([five.inertial_parameters] * 3)
+    score = fb.score(five, moved, bodies_of_three)
     both = balancing.compare({"a": five, "b": design}, moved)
     paths = fb.drive(five, moved, near=linkage.configuration(*moved.q[0], mode=paper.AssemblyMode.LEFT))
     regions = (
@@ -207,6 +208,7 @@ def specimens() -> tuple[object, ...]:
         fb.diagnosis.propose_closures(fb.ClosedChain(five.model, (), ())),
         fb.diagnosis.propose_motors(five),
         fb.frame_motion(chain, trajectory, "coupler_end"),
+        fb.sweep(five, moved, inertias=bodies_of_three, of=("torque", "peak_torque")),
     )
     bodies = (fb.chain.BarBody(("a", "b"), 0.5), fb.chain.LumpBody(("a",), 1.0))
     plate = fb.chain.PlateBody(("a", "b", "c"), 2700.0, 0.01)

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, Immutable, all_of, checked, number
+from fivebar_pin._arrays import Array, Immutable, all_of, checked, cross, number
+from fivebar_pin.chain.masses import inertia_of, packed
 from fivebar_pin.errors import InvalidInputError
 
 __all__ = ["RULES", "BarBody", "Body", "LumpBody", "PlateBody", "axes_along"]
@@ -33,8 +35,27 @@ class Body(Immutable, ABC):
     frames: tuple[str, ...]
 
     @abstractmethod
+    def masses(self, poses: Array) -> Array:
+        """Return its rows, see `fivebar_pin.chain.masses`, in the axes of the link's joint, of n designs (n, 10).
+
+        Args:
+            poses: of the frames there (n, k, 4, 4).
+
+        Returns:
+            Mass, mass centre and moments about it; nan where it is no body.
+        """
+
     def inertia(self, poses: Array) -> pin.Inertia:
-        """Return the inertia in the axes of the link's joint, from the poses of the frames there (k, 4, 4)."""
+        """Return the inertia in the axes of the link's joint, from the poses of the frames there (k, 4, 4).
+
+        Raises:
+            InvalidInputError: frames that make no body.
+        """
+        self.require_real(poses)
+        return inertia_of(self.masses(poses[None])[0])
+
+    def require_real(self, poses: Array) -> None:
+        """Raise where the frames (k, 4, 4) make no body."""
 
     def drawn(self, poses: Array) -> tuple[tuple[tuple[float, ...], Array], ...]:
         """Return the boxes that show it: size (x, y, z) [m] and pose (4, 4) in the axes of the link's joint."""
@@ -75,12 +96,20 @@ class BarBody(Body):
         for name in ("linear_density", "width", "thickness"):
             self._size(name, may_be_zero=True)
 
-    def inertia(self, poses: Array) -> pin.Inertia:
-        """Return that of a box of its length, width and thickness."""
-        size, pose = self._box(poses)
-        if self.linear_density == 0.0:
-            return pin.Inertia.Zero()
-        return pin.SE3(pose).act(pin.Inertia.FromBox(self.linear_density * size[0], *size))
+    def masses(self, poses: Array) -> Array:
+        """Return those of boxes of its length, width and thickness."""
+        along = poses[:, 1, :3, 3] - poses[:, 0, :3, 3]
+        length = np.sqrt(np.sum(along * along, axis=1))
+        axes = axes_along(along / length[:, None])
+        mass = self.linear_density * length
+        sides = np.stack([length, np.full_like(length, self.width), np.full_like(length, self.thickness)], axis=1) ** 2
+        moments = mass[:, None] / 12.0 * (sides[:, [1, 0, 0]] + sides[:, [2, 2, 1]])
+        tensor = np.matmul(axes * moments[:, None, :], np.swapaxes(axes, 1, 2))
+        return packed(mass, 0.5 * (poses[:, 0, :3, 3] + poses[:, 1, :3, 3]), tensor)
+
+    def require_real(self, poses: Array) -> None:
+        """Raise for a bar without length."""
+        self._box(poses)
 
     def drawn(self, poses: Array) -> tuple[tuple[tuple[float, ...], Array], ...]:
         """Return its box."""
@@ -118,27 +147,40 @@ class PlateBody(Body):
         for name in ("density", "width"):
             self._size(name, may_be_zero=True)
 
-    def inertia(self, poses: Array) -> pin.Inertia:
-        """Return that of the polygon, by Green's theorem."""
-        corners = poses[:, :3, 3]
-        x, y, z = corners[:, 0], corners[:, 1], float(np.mean(corners[:, 2]))
-        self._check_polygon(corners[:, :2])
-        if self.density == 0.0:
-            return pin.Inertia.Zero()
-        x0, y0 = float(x.mean()), float(y.mean())
-        x, y = x - x0, y - y0
-        X, Y = np.roll(x, -1), np.roll(y, -1)
+    def masses(self, poses: Array) -> Array:
+        """Return those of the polygon, by Green's theorem."""
+        corners = poses[:, :, :3, 3]
+        middle = corners.mean(axis=1)
+        x, y = corners[:, :, 0] - middle[:, :1], corners[:, :, 1] - middle[:, 1:2]
+        X, Y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
         turn = x * Y - X * y
-        area = 0.5 * turn.sum()
-        cx, cy = (turn @ (x + X)) / (6.0 * area), (turn @ (y + Y)) / (6.0 * area)
-        xx = turn @ (x * x + x * X + X * X) / 12.0 - area * cx * cx
-        yy = turn @ (y * y + y * Y + Y * Y) / 12.0 - area * cy * cy
-        xy = turn @ (x * Y + 2.0 * x * y + 2.0 * X * Y + X * y) / 24.0 - area * cx * cy
+        area = 0.5 * turn.sum(axis=1)
+        cx, cy = (np.sum(turn * c, axis=1) / (6.0 * area) for c in (x + X, y + Y))
+        xx = np.sum(turn * (x * x + x * X + X * X), axis=1) / 12.0 - area * cx * cx
+        yy = np.sum(turn * (y * y + y * Y + Y * Y), axis=1) / 12.0 - area * cy * cy
+        xy = np.sum(turn * (x * Y + 2.0 * x * y + 2.0 * X * Y + X * y), axis=1) / 24.0 - area * cx * cy
         weight = self.density * self.thickness * np.sign(area)
         mass = weight * area
-        flat = mass * self.thickness**2 / 12.0
-        tensor = weight * np.array([[yy, -xy, 0.0], [-xy, xx, 0.0], [0.0, 0.0, xx + yy]]) + np.diag([flat, flat, 0.0])
-        return pin.Inertia(float(mass), np.array([cx + x0, cy + y0, z]), tensor)
+        flat, none = mass * self.thickness**2 / 12.0, np.zeros_like(mass)
+        columns = (
+            mass,
+            cx,
+            cy,
+            none,
+            weight * yy + flat,
+            -weight * xy,
+            weight * xx + flat,
+            none,
+            none,
+            weight * (xx + yy),
+        )
+        rows = np.stack(columns, axis=1)
+        rows[:, 1:4] += middle
+        return np.where(self._real(corners[:, :, :2])[:, None], rows, np.nan)
+
+    def require_real(self, poses: Array) -> None:
+        """Raise for corners on one line, and where sides cross."""
+        self._check_polygon(poses[:, :2, 3])
 
     def drawn(self, poses: Array) -> tuple[tuple[tuple[float, ...], Array], ...]:
         """Return a box for each side."""
@@ -148,14 +190,26 @@ class PlateBody(Body):
 
     def _check_polygon(self, corners: Array) -> None:
         name = f"corners of the plate {'-'.join(self.frames)}"
-        sides = list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
-        for (i, (a, b)), (k, (c, d)) in combinations(enumerate(sides), 2):
-            if k - i not in (1, len(sides) - 1) and _cross_over(a, b, c, d):
-                raise InvalidInputError(name, corners.tolist(), "make sides that cross", "Name them in order.")
-        extent = float(np.ptp(corners, axis=0).max())
-        area = 0.5 * sum(_turn(a, b) for a, b in sides - corners.mean(axis=0))
-        if abs(area) <= _FLAT * extent**2:
+        if self._crossed(corners[None])[0]:
+            raise InvalidInputError(name, corners.tolist(), "make sides that cross", "Name them in order.")
+        if not self._real(corners[None])[0]:
             raise InvalidInputError(name, corners.tolist(), "lie on one line", "Make it of bars instead.")
+
+    def _real(self, corners: Array) -> npt.NDArray[np.bool_]:
+        """Tell which polygons (n, k, 2) are ones: no sides cross, and they are no lines."""
+        extent = np.ptp(corners, axis=1).max(axis=1)
+        away = corners - corners.mean(axis=1, keepdims=True)
+        area = 0.5 * np.sum(_turn(away, np.roll(away, -1, axis=1)), axis=1)
+        return np.asarray(~self._crossed(corners) & (np.abs(area) > _FLAT * extent**2))
+
+    def _crossed(self, corners: Array) -> npt.NDArray[np.bool_]:
+        """Tell where sides that are no neighbours cross or touch (n,)."""
+        found = np.zeros(corners.shape[0], dtype=np.bool_)
+        ends, k = np.roll(corners, -1, axis=1), corners.shape[1]
+        for i, j in combinations(range(k), 2):
+            if j - i not in (1, k - 1):
+                found |= _cross_over(corners[:, i], ends[:, i], corners[:, j], ends[:, j])
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,12 +235,12 @@ class LumpBody(Body):
         centre = checked(f"centre of the body at {self.frames[0]}", self.centre, (3,))
         object.__setattr__(self, "centre", tuple(float(x) for x in centre))
 
-    def inertia(self, poses: Array) -> pin.Inertia:
-        """Return it, carried along by the frame."""
-        if self.mass == 0.0 and self.inertia_z == 0.0:
-            return pin.Inertia.Zero()
+    def masses(self, poses: Array) -> Array:
+        """Return those of it, carried along by the frame."""
+        R, n = poses[:, 0, :3, :3], poses.shape[0]
         tensor = np.diag([0.5 * self.inertia_z, 0.5 * self.inertia_z, self.inertia_z])
-        return pin.SE3(poses[0]).act(pin.Inertia(self.mass, np.array(self.centre), tensor))
+        centre = np.matmul(R, np.array(self.centre)) + poses[:, 0, :3, 3]
+        return packed(np.full(n, self.mass), centre, np.matmul(np.matmul(R, tensor), np.swapaxes(R, 1, 2)))
 
 
 RULES: dict[str, type[Body]] = {"bar": BarBody, "lump": LumpBody, "plate": PlateBody}
@@ -194,18 +248,18 @@ RULES: dict[str, type[Body]] = {"bar": BarBody, "lump": LumpBody, "plate": Plate
 
 
 def axes_along(x: Array) -> Array:
-    """Return axes (3, 3) whose first is the unit vector x and whose second is horizontal (y when x is along z)."""
-    helper = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    y = np.cross(helper, x)
-    y /= np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
+    """Return axes (..., 3, 3) whose first is x (..., 3) of length one, the second horizontal (y where x is along z)."""
+    helper = np.where(np.abs(x[..., 2:]) < 0.9, np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
+    y = cross(helper, x)
+    y = y / np.sqrt(np.sum(y * y, axis=-1, keepdims=True))
+    return np.stack([x, y, cross(x, y)], axis=-1)
 
 
-def _turn(a: Array, b: Array) -> float:
-    return float(a[0] * b[1] - a[1] * b[0])
+def _turn(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _cross_over(a: Array, b: Array, c: Array, d: Array) -> bool:
-    """Tell whether two segments of the plane cross or touch."""
-    apart = _turn(b - a, c - a) * _turn(b - a, d - a) > 0.0 or _turn(d - c, a - c) * _turn(d - c, b - c) > 0.0
-    return not apart
+def _cross_over(a: Array, b: Array, c: Array, d: Array) -> npt.NDArray[np.bool_]:
+    """Tell which segments of the plane cross or touch, ends (n, 2) each."""
+    apart = (_turn(b - a, c - a) * _turn(b - a, d - a) > 0.0) | (_turn(d - c, a - c) * _turn(d - c, b - c) > 0.0)
+    return np.asarray(~apart)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, Immutable, all_of, checked, number
+from fivebar_pin._arrays import Array, Immutable, all_of, checked, number, skew
 from fivebar_pin.chain.bodies import Body
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
@@ -56,10 +56,32 @@ class Placement(Immutable):
 
     def at(self, values: Mapping[str, float]) -> pin.SE3:
         """Return the pose for values of the parameters."""
-        M = pin.SE3(np.array(self.base))
+        return pin.SE3(self.poses({name: np.array([values[name]]) for name, _ in self.moves})[0])
+
+    def poses(self, values: Mapping[str, Array]) -> Array:
+        """Return the poses (n, 4, 4) for n designs, values (n,) of the parameters; one pose where none moves it."""
+        M = np.asarray(self.base)[None]
         for name, twist in self.moves:
-            M = M * pin.exp6(pin.Motion(values[name] * twist))
+            M = np.matmul(M, _exponentials(twist, values[name]))
+        return np.array(M)
+
+
+def _exponentials(twist: Array, x: Array) -> Array:
+    """Return exp(x s) of a twist s for numbers x (n,): (n, 4, 4) [Murray, Li and Sastry 1994, (2.36)].
+
+    R = 1 + sin θ K + (1 - cos θ) K^2,     p = (θ + (1 - cos θ) K + (θ - sin θ) K^2) v,     K = [w]×
+    """
+    M = np.tile(np.eye(4), (x.size, 1, 1))
+    v, w = twist[:3], twist[3:]
+    rate = float(np.linalg.norm(w))
+    if rate == 0.0:
+        M[:, :3, 3] = x[:, None] * v
         return M
+    K, angle = skew(w / rate), (rate * x)[:, None, None]
+    c, s, versed = np.cos(angle), np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2  # exact where it hardly turns, too
+    M[:, :3, :3] = c * np.eye(3) + s * K + versed * np.outer(w, w) / rate**2
+    M[:, :3, 3] = np.matmul(angle * np.eye(3) + versed * K + (angle - s) * (K @ K), v / rate)
+    return M
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,7 +22,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
 from fivebar_pin.mechanism.prepared import Prepared
 
-__all__ = ["Followed", "blocked", "follow", "open_by", "reach", "singular"]
+__all__ = ["Followed", "blocked", "follow", "open_by", "reach", "require_near", "singular"]
 
 
 _CHUNK = 4096  # samples that are followed one after the other
@@ -72,7 +72,7 @@ def reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Ar
         SingularityError, AssemblyError: the way is blocked; with an attribute `sample` at the end not reached.
         InvalidInputError: the closures tie the motors to each other; a line too long.
     """
-    _require_near(loops, X)
+    require_near(loops, X)
     q, gap, error = _reach(loops, ready, q0, X)
     if error is not None:
         raise error
@@ -94,7 +94,7 @@ def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array,
         InvalidInputError: the closures tie the motors to each other; steps too long.
     """
     X, n = motion[0], len(motion[0])
-    _require_near(loops, X)
+    require_near(loops, X)
     out = Followed.room(loops, n, q0.size)
     chunks = [_Chunk(loops, ready, motion, out, k, min(k + _CHUNK, n)) for k in range(0, n, _CHUNK)]
     if len(chunks) == 1:
@@ -160,7 +160,7 @@ def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, A
     return out.q, out.gap, _at(_blocked(loops, ready, X[done], done), done) if done < len(X) else None
 
 
-def _require_near(loops: Loops, X: Array) -> None:
+def require_near(loops: Loops, X: Array) -> None:
     """Raise for a step so long that to follow it would take for ever."""
     if len(X) < 2 or not X.shape[1]:
         return

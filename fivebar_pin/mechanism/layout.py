@@ -13,16 +13,19 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
+from fivebar_pin.chain.masses import turned
 from fivebar_pin.closures.anchored import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
 from fivebar_pin.engine import tables as e
+from fivebar_pin.mechanism.dimensions import Dimensions, dimensions_of
 from fivebar_pin.mechanism.links import Link
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["Block", "blocks_of", "joined_rows", "layout_of"]
+__all__ = ["SORTS", "Block", "Parts", "blocks_of", "constants_of", "joined_rows", "layout_of"]
 
-_SORTS = {"along": e.ALONG, "tilt": e.TILT, "turned": e.TURNED, "length": e.LENGTH}
+SORTS = {"along": e.ALONG, "tilt": e.TILT, "turned": e.TURNED, "length": e.LENGTH}
+"""Sorts of rows between frames, by their word."""
 _TOGETHER = 1e-12  # distance of a spring's ends that is round-off: they lie on one point [chain lengths]
 
 Index = npt.NDArray[np.intp]
@@ -146,6 +149,9 @@ class Parts:
         blocks: in order.
         scale: unit of every velocity (nv,).
         length: of the chain [m].
+        left: of every closure, combinations of its rows that say nothing anywhere, where they are known.
+        dimensions: of other designs, one or many, in place of its own.
+        bodiless: whether bodies that weigh nothing get a place as well: in other designs they may be some.
     """
 
     chain: Described
@@ -155,6 +161,9 @@ class Parts:
     blocks: Sequence[Block]
     scale: Array
     length: float
+    left: Sequence[Sequence[Row]] = ()
+    dimensions: Dimensions | None = None
+    bodiless: bool = False
 
 
 def layout_of(parts: Parts) -> tuple[e.Integers, Array]:
@@ -162,9 +171,14 @@ def layout_of(parts: Parts) -> tuple[e.Integers, Array]:
     return _Layout(parts).vectors()
 
 
-def _placement(x: Link) -> list[float]:
-    """Return the numbers of the placement of a link on its parent."""
-    return [*x.R.ravel(), *x.p, x.pitch, float(np.array_equal(x.R, np.eye(3)))]
+def constants_of(parts: Parts) -> Array:
+    """Return the constants of n designs as they stand in front of W (n, constants).
+
+    Units and rows are those of the chain of the parts: another design is measured in its lengths, too.
+    """
+    layout = _Layout(parts)
+    layout.constants()
+    return layout.written()
 
 
 class _Layout:
@@ -174,17 +188,26 @@ class _Layout:
         self.parts, self.model = parts, parts.chain.model
         self.head = np.zeros(e.HEADER, dtype=np.int64)
         self.records: list[int] = []
-        self.numbers: list[float] = []
+        self.numbers: list[Array] = []  # (1 or n, k) each
+        self.filled = 0
         self.last = {0: 0, **{x.joint: j for j, x in enumerate(parts.links, start=1)}}  # link of a joint's body
         self.axes = {0: np.eye(3), **{x.joint: x.axes for x in parts.links}}
+        self.dimensions = parts.dimensions or dimensions_of(self.model, self._frame_names())
+
+    def _frame_names(self) -> Iterator[str]:
+        """Yield the frames that closures and springs are at."""
+        for anchored in self.parts.anchored:
+            yield from anchored.closure.frames if isinstance(anchored, AnchoredFrames) else ()
+        for one in self.parts.chain.springs:
+            yield from (one.frame1, one.frame2) if isinstance(one, Spring) else ()
 
     def vectors(self) -> tuple[e.Integers, Array]:
         chain = self.parts.chain
         self.head[[e.NQ, e.NV, e.NA]] = chain.nq, chain.nv, chain.na
-        constants = self._constants()
-        self.head[e.CONSTANTS] = len(self.numbers)
+        constants = self.constants()
+        self.head[e.CONSTANTS] = self.filled
         memory = self._memory()
-        self.head[e.MEMORY] = len(self.numbers)
+        self.head[e.MEMORY] = self.filled
         self.head[e.MOTORS] = self._write(chain.actuated_index.tolist())
         lists = [self._block_lists(block) for block in self.parts.blocks]
         reached = self._reached()
@@ -195,12 +218,22 @@ class _Layout:
         rows = self._closures(constants, memory)
         self._fill_blocks(constants, memory, blocks, lists, rows)
         self._springs(constants, memory)
-        return np.concatenate([self.head, self.records]).astype(np.int64), np.array(self.numbers)
+        return np.concatenate([self.head, self.records]).astype(np.int64), self.written()[0]
+
+    def written(self) -> Array:
+        """Return what stands in W so far, of every design (n, filled)."""
+        n = max(len(x) for x in self.numbers)
+        return np.concatenate([np.broadcast_to(x, (n, x.shape[1])) for x in self.numbers], axis=1)
 
     def _put(self, values: npt.ArrayLike) -> int:
-        """Put numbers into W and return their place."""
-        at = len(self.numbers)
-        self.numbers.extend(np.ravel(np.asarray(values, dtype=np.float64)).tolist())
+        """Put numbers that all designs have in common into W and return their place."""
+        return self._put_each(np.ravel(np.asarray(values, dtype=np.float64))[None])
+
+    def _put_each(self, values: Array) -> int:
+        """Put numbers (n, ...) of every design into W and return their place."""
+        at = self.filled
+        self.numbers.append(values.reshape(len(values), -1))
+        self.filled += self.numbers[-1].shape[1]
         return at
 
     def _room(self, count: int, value: float = 0.0) -> int:
@@ -223,7 +256,7 @@ class _Layout:
         for field, value in fields.items():
             self.records[at - e.HEADER + field] = int(value)
 
-    def _constants(self) -> dict[str, list[int]]:
+    def constants(self) -> dict[str, list[int]]:
         """Put the constants of the design into W and return their places, by what they are."""
         parts, model = self.parts, self.model
         self.head[e.GRAVITY] = self._put(model.gravity.linear)
@@ -231,33 +264,49 @@ class _Layout:
         losses = (model.armature, model.damping, model.upperDryFrictionLimit)
         self.head[e.LOSSES] = self._put(np.column_stack([np.array(x) for x in losses]))
         return {
-            "fixed": [self._put(np.zeros(14)), *(self._put(_placement(x)) for x in parts.links)],
+            "fixed": [self._put(np.zeros(14)), *(self._put_each(self._fixed(x)) for x in parts.links)],
             "mass": [-1, *(self._mass(j) for j in range(1, len(parts.links) + 1))],
-            "frames": [self._put(self._frames(c)) for c in parts.anchored],
+            "frames": [self._put_each(self._frames(c)) for c in parts.anchored],
             "direction": [self._put(row) for c, rows in self._with_rows() for row in self._directions(c, rows)],
             "ratio": [self._put(r) for c in parts.anchored for r in self._ratios(c)],
             "mix": [-1 if b.mix is None else self._put(b.mix) for b in parts.blocks],
-            "coil": [self._put(x) for x in self._coils()],
+            "coil": [self._put_each(x) for x in self._coils()],
         }
 
     def _with_rows(self) -> Iterator[tuple[Anchored, Sequence[Row]]]:
         return zip(self.parts.anchored, self.parts.rows, strict=True)
 
+    def _fixed(self, x: Link) -> Array:
+        """Return of a link axes and origin on its parent, pitch, and whether its axes are not turned (n, 14)."""
+        R, p = x.R[None], x.p[None]
+        if x.first:
+            R, p = x.placed(self.axes[int(self.model.parents[x.joint])], self.dimensions.joints[x.joint])
+        R = R.reshape(-1, 9)
+        aligned = np.all(np.eye(3).ravel() == R, axis=1)
+        return np.column_stack([R, p, np.full(len(p), x.pitch), aligned])
+
     def _mass(self, j: int) -> int:
         """Return the place of mass, mass centre and moments about it in the axes of a link, or -1 where it has none."""
         joint, axes = self.parts.links[j - 1].joint, self.parts.links[j - 1].axes
-        body = self.model.inertias[joint]
-        if self.last[joint] != j or not (body.mass or np.any(body.inertia)):
+        rows = self.dimensions.masses[joint]
+        if self.last[joint] != j or not (self.parts.bodiless or rows[:, 0].any() or rows[:, 4:].any()):
             return -1
-        C = axes.T @ body.inertia @ axes
-        return self._put([body.mass, *(axes.T @ body.lever), C[0, 0], C[0, 1], C[1, 1], C[0, 2], C[1, 2], C[2, 2]])
+        return self._put_each(turned(rows, axes))
 
     def _frames(self, anchored: Anchored) -> Array:
+        """Return the placements of both frames on their links (n, 24)."""
         if not isinstance(anchored, AnchoredFrames):
-            return np.zeros(24)
-        sides = zip(anchored.joints, anchored.R, anchored.p, strict=True)
-        placed = [(self.axes[j].T @ R, self.axes[j].T @ p) for j, R, p in sides]
-        return np.concatenate([x.ravel() for pair in placed for x in pair])
+            return np.zeros((1, 24))
+        sides = [self._frame(j, name) for j, name in zip(anchored.joints, anchored.closure.frames, strict=True)]
+        n = max(len(x) for pair in sides for x in pair)
+        return np.concatenate(
+            [np.broadcast_to(x.reshape(len(x), -1), (n, x[0].size)) for s in sides for x in s], axis=1
+        )
+
+    def _frame(self, joint: int, name: str) -> tuple[Array, Array]:
+        """Return axes (n, 3, 3) and origin (n, 3) of a frame on the link of a joint."""
+        M, back = self.dimensions.frames[name], self.axes[joint].T
+        return np.matmul(back, M[:, :3, :3]), np.matmul(back, M[:, :3, 3, None])[..., 0]
 
     def _directions(self, anchored: Anchored, rows: Sequence[Row]) -> list[list[float]]:
         if not isinstance(anchored, AnchoredFrames):
@@ -270,20 +319,21 @@ class _Layout:
         tied = not isinstance(anchored, AnchoredFrames)
         return anchored.numbers()[:-1] if tied else np.zeros(anchored.columns.size)
 
-    def _coils(self) -> Iterator[list[float]]:
+    def _coils(self) -> Iterator[Array]:
+        """Yield the numbers of every spring (n, 10)."""
         for one in self.parts.chain.springs:
             if isinstance(one, JointSpring):
-                yield [*np.zeros(6), one.stiffness, one.rest, one.damping, 0.0]
+                yield np.array([[*np.zeros(6), one.stiffness, one.rest, one.damping, 0.0]])
             else:
-                points = [p for _, p in self._ends(one)]
-                yield [*points[0], *points[1], one.stiffness, one.length, one.damping, _TOGETHER * self.parts.length]
+                points = np.broadcast_arrays(*(p for _, p in self._ends(one)))
+                own = [one.stiffness, one.length, one.damping, _TOGETHER * self.parts.length]
+                yield np.concatenate([*points, np.broadcast_to(own, (len(points[0]), 4))], axis=1)
 
     def _ends(self, spring: Spring) -> list[tuple[int, Array]]:
-        """Return the links at the ends of a spring and its points in their axes."""
-        frames = [find_frame(self.model, name) for name in (spring.frame1, spring.frame2)]
-        joints = [int(f.parentJoint) for f in frames]
-        points = [self.axes[j].T @ np.array(f.placement.translation) for j, f in zip(joints, frames, strict=True)]
-        return [(self.last[j], p) for j, p in zip(joints, points, strict=True)]
+        """Return the links at the ends of a spring and its points in their axes (n, 3)."""
+        names = (spring.frame1, spring.frame2)
+        joints = [int(find_frame(self.model, name).parentJoint) for name in names]
+        return [(self.last[j], self._frame(j, name)[1]) for j, name in zip(joints, names, strict=True)]
 
     def _memory(self) -> dict[str, list[int]]:
         """Make room in W for what is known of a sample and return the places, by what they are."""
@@ -347,7 +397,7 @@ class _Layout:
         columns: int,
     ) -> None:
         at = self._begin(e.LINKS, e.LINK_SIZE, len(self.parts.links) + 1)
-        ground = Link(0, 0, 0, 0, 0, np.eye(3), np.zeros(3), np.eye(3), 0.0, ())
+        ground = Link(0, 0, 0, 0, 0, np.eye(3), np.zeros(3), np.eye(3), 0.0, (), np.eye(4), True)
         for j, x in enumerate([ground, *self.parts.links]):
             self._set(
                 at + e.LINK_SIZE * j,
@@ -403,7 +453,7 @@ class _Layout:
                 self._set(
                     first + e.ROW_SIZE * r,
                     {
-                        e.SORT: _SORTS[rows[row].sort] if between else e.RATIOS, e.DIRECTION: constants["direction"][r],
+                        e.SORT: SORTS[rows[row].sort] if between else e.RATIOS, e.DIRECTION: constants["direction"][r],
                         e.RESIDUAL: memory["residual"][r], e.LEAD: memory["lead"][r], e.WRENCH: memory["wrench"][r],
                         e.JACOBIAN0: memory["jacobian"][r], e.ENTRIES: entries[n], e.ENTRIES_END: end,
                         e.CLOSURE: closure,

@@ -6,7 +6,7 @@ A joint of several axes in a row is several links. Everything that a joint does 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -32,6 +32,8 @@ class Link:
         pitch: how far the joint slides for a unit of its coordinate: the lead of a screw [m/rad], one for slides unless
             their axis has another length.
         columns: axis and motion of every velocity coordinate.
+        within: pose (4, 4) on the joint's placement, or on the link of the same joint before.
+        first: whether it is the first link of its joint.
     """
 
     joint: int
@@ -44,6 +46,13 @@ class Link:
     axes: Array
     pitch: float
     columns: tuple[tuple[int, int], ...]
+    within: Array
+    first: bool
+
+    def placed(self, before: Array, placements: Array) -> tuple[Array, Array]:
+        """Return axes (n, 3, 3) and origin (n, 3) on the parent, whose axes are `before`, for placements (n, 4, 4)."""
+        M = np.matmul(placements, self.within)
+        return np.matmul(np.matmul(before.T, M[:, :3, :3]), self.axes), np.matmul(before.T, M[:, :3, 3, None])[..., 0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,24 +89,11 @@ def links_of(model: pin.Model) -> list[Link]:
         q, v = int(model.idx_qs[j]), int(model.idx_vs[j])
         placement = model.jointPlacements[j]
         for part in _parts(model, model.joints[j]):
-            turn = _to_z(part.axis)
-            M = placement * part.placement
-            before = axes[parent]
-            columns = _COLUMNS[part.kind]
-            links.append(
-                Link(
-                    j,
-                    parent,
-                    part.kind,
-                    q,
-                    v,
-                    before.T @ np.array(M.rotation) @ turn,
-                    before.T @ np.array(M.translation),
-                    turn,
-                    part.pitch,
-                    columns,
-                )  # fmt: skip
-            )
+            turn, columns = _to_z(part.axis), _COLUMNS[part.kind]
+            within, first = np.array(part.placement.homogeneous), parent == last[int(model.parents[j])]
+            link = Link(j, parent, part.kind, q, v, np.eye(3), np.zeros(3), turn, part.pitch, columns, within, first)
+            R, p = link.placed(axes[parent], np.array(placement.homogeneous)[None])
+            links.append(replace(link, R=R[0], p=p[0]))
             parent, placement = len(links), pin.SE3.Identity()
             axes[parent] = turn
             q, v = q + _COORDINATES.get(part.kind, 1), v + len(columns)

@@ -19,9 +19,12 @@ from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.rank import ranks_of
 
-__all__ = ["Prepared", "prepared_of"]
+__all__ = ["Prepared", "parts_of", "prepared_of"]
+
+_SILENT = 1e-12  # share of the largest singular value that is the round-off of a row that says nothing [-]
 
 Flags = npt.NDArray[np.bool_]
+_Split = tuple[tuple[Row, ...], tuple[Row, ...], Array, tuple[Array, Array]]
 
 
 class Prepared:
@@ -59,26 +62,36 @@ class Prepared:
 def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
     loops = loops_of(chain)
-    found = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
-    kept = [(rows, J) for rows, J, _ in found]
-    starts = np.cumsum([0, *(J.shape[1] for _, J in kept)])
-    touched = [c.columns for c, (_, J) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
+    parts, mixes = _parts(chain, loops)
+    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, _mixes(loops, mixes))
+
+
+def parts_of(chain: ClosedChain) -> Parts:
+    """Return what the tables of a chain are made of: independent rows, and the blocks they make."""
+    return _parts(chain, loops_of(chain))[0]
+
+
+def _parts(chain: ClosedChain, loops: Loops) -> tuple[Parts, list[tuple[Array, Array]]]:
+    """Return the same, and of every closure how its rows are combined."""
+    kept = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
+    starts = np.cumsum([0, *(J.shape[1] for _, _, J, _ in kept)])
+    touched = [c.columns for c, (_, _, J, _) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
     systems = []
     for group in loops.independent:
         rows = np.concatenate([np.arange(starts[k], starts[k + 1]) for k in group.members])
-        wide = [_spread(kept[k][1], loops.anchored[k].columns, chain.nv) for k in group.members]
+        wide = [_spread(kept[k][2], loops.anchored[k].columns, chain.nv) for k in group.members]
         systems.append((rows, loops.passive[group.passive], _combinations(np.concatenate(wide))))
-    blocks = blocks_of(systems, touched, chain.actuated_index)
     parts = Parts(
         chain,
         links_of(chain.model),
         loops.anchored,
-        [rows for rows, _ in kept],
-        blocks,
+        [rows for rows, *_ in kept],
+        blocks_of(systems, touched, chain.actuated_index),
         loops.column_scale,
         loops.length,
+        [left for _, left, *_ in kept],
     )
-    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, _mixes(loops, [mixes for *_, mixes in found]))
+    return parts, [mixes for *_, mixes in kept]
 
 
 def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
@@ -103,8 +116,8 @@ def _mixes(loops: Loops, parts: list[tuple[Array, Array]]) -> tuple[Array, Array
     return kept, vanishing
 
 
-def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], Array, tuple[Array, Array]]:
-    """Return the rows of a closure without those that say nothing anywhere, and their scaled Jacobian.
+def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> _Split:
+    """Return the rows of a closure that say something, those that say nothing anywhere, and the scaled Jacobian.
 
     Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane. The combinations
     that are kept, and those that are not, come with them.
@@ -112,22 +125,44 @@ def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple
     J, length = J * loops.column_scale[anchored.columns], loops.length
     if not isinstance(anchored, AnchoredFrames):
         whole = np.eye(J.shape[1])
-        return (), J * anchored.row_scale(length, loops.column_scale)[:, None], (whole, whole[:0])
+        return (), (), J * anchored.row_scale(length, loops.column_scale)[:, None], (whole, whole[:0])
     rows = anchored.closure.rows
     kept: list[Row] = []
+    left: list[Row] = []
     scaled: list[Array] = []
     mixes: tuple[list[Array], list[Array]] = [], []
     for sort in dict.fromkeys((row.sort, row.other.tobytes()) for row in rows):
         some = [k for k, row in enumerate(rows) if (row.sort, row.other.tobytes()) == sort]
         mine = J[:, some] * (1.0 / length if sort[0] in ("along", "length") else 1.0)
-        U, s, _ = np.linalg.svd(np.concatenate(list(mine), axis=1), full_matrices=False)
-        r, places = int(ranks_of(s)), np.eye(len(rows))[some]
-        mix = np.eye(len(some)) if r == len(some) else U[:, :r].T
-        kept += [rows[k] for k in some] if r == len(some) else joined_rows([rows[k] for k in some], mix)
+        mix, idle = _split(np.concatenate(list(mine), axis=1))
+        kept += joined_rows([rows[k] for k in some], mix)
+        left += joined_rows([rows[k] for k in some], idle)
         scaled.append(np.matmul(mix, mine))
-        for some_mixes, mixed in zip(mixes, (mix, np.linalg.svd(mix)[2][r:]), strict=True):
-            some_mixes.append(mixed @ places)
-    return tuple(kept), np.concatenate(scaled, axis=1), (np.concatenate(mixes[0]), np.concatenate(mixes[1]))
+        places = np.eye(len(rows))[some]
+        mixes[0].append(mix @ places)
+        mixes[1].append(idle @ places)
+    return (
+        tuple(kept),
+        tuple(left),
+        np.concatenate(scaled, axis=1),
+        (np.concatenate(mixes[0]), np.concatenate(mixes[1])),
+    )
+
+
+def _split(wide: Array) -> tuple[Array, Array]:
+    """Return combinations of rows (k, m) that are independent, and the others, which vanish.
+
+    Rows that are zero are left out and the others stay as they are, so that they are the same for all designs of a
+    linkage; only where that is not all they are mixed.
+    """
+    U, s, _ = np.linalg.svd(wide, full_matrices=False)
+    r = int(ranks_of(s))
+    sizes = np.linalg.norm(wide, axis=1)
+    silent = np.argsort(sizes)[: len(wide) - r]
+    if np.all(sizes[silent] <= _SILENT * s.max(initial=0.0)):
+        same = np.eye(len(wide))
+        return np.delete(same, silent, axis=0), same[np.sort(silent)]
+    return np.asarray(U[:, :r].T), np.asarray(U[:, r:].T)
 
 
 def _spread(J: Array, columns: Index, nv: int) -> Array:
