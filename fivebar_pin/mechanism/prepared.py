@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +25,6 @@ __all__ = ["Prepared", "parts_of", "prepared_of"]
 _SILENT = 1e-12  # share of the largest singular value that is the round-off of a row that says nothing [-]
 
 Flags = npt.NDArray[np.bool_]
-_Split = tuple[tuple[Row, ...], tuple[Row, ...], Array, tuple[Array, Array]]
 
 
 class Prepared:
@@ -62,36 +62,36 @@ class Prepared:
 def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
     loops = loops_of(chain)
-    parts, mixes = _parts(chain, loops)
-    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, _mixes(loops, mixes))
+    parts, mixes = _taken_apart(loops, chain)
+    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, mixes)
 
 
 def parts_of(chain: ClosedChain) -> Parts:
     """Return what the tables of a chain are made of: independent rows, and the blocks they make."""
-    return _parts(chain, loops_of(chain))[0]
+    return _taken_apart(loops_of(chain), chain)[0]
 
 
-def _parts(chain: ClosedChain, loops: Loops) -> tuple[Parts, list[tuple[Array, Array]]]:
-    """Return the same, and of every closure how its rows are combined."""
+def _taken_apart(loops: Loops, chain: ClosedChain) -> tuple[Parts, tuple[Array, Array]]:
+    """Return the parts of a chain, and the combinations of all rows that are kept and that vanish."""
     kept = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
-    starts = np.cumsum([0, *(J.shape[1] for _, _, J, _ in kept)])
-    touched = [c.columns for c, (_, _, J, _) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
+    starts = np.cumsum([0, *(x.J.shape[1] for x in kept)])
+    touched = [c.columns for c, x in zip(loops.anchored, kept, strict=True) for _ in range(x.J.shape[1])]
     systems = []
     for group in loops.independent:
         rows = np.concatenate([np.arange(starts[k], starts[k + 1]) for k in group.members])
-        wide = [_spread(kept[k][2], loops.anchored[k].columns, chain.nv) for k in group.members]
+        wide = [_spread(kept[k].J, loops.anchored[k].columns, chain.nv) for k in group.members]
         systems.append((rows, loops.passive[group.passive], _combinations(np.concatenate(wide))))
     parts = Parts(
         chain,
         links_of(chain.model),
         loops.anchored,
-        [rows for rows, *_ in kept],
+        [x.rows for x in kept],
         blocks_of(systems, touched, chain.actuated_index),
         loops.column_scale,
         loops.length,
-        [left for _, left, *_ in kept],
+        [x.left for x in kept],
     )
-    return parts, [mixes for *_, mixes in kept]
+    return parts, _mixes(loops, [x.mixes for x in kept])
 
 
 def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
@@ -116,8 +116,17 @@ def _mixes(loops: Loops, parts: list[tuple[Array, Array]]) -> tuple[Array, Array
     return kept, vanishing
 
 
-def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> _Split:
-    """Return the rows of a closure that say something, those that say nothing anywhere, and the scaled Jacobian.
+class _Kept(NamedTuple):
+    """What is kept of the rows of a closure, what says nothing, the scaled Jacobian, and both as combinations."""
+
+    rows: tuple[Row, ...]
+    left: tuple[Row, ...]
+    J: Array
+    mixes: tuple[Array, Array]
+
+
+def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> _Kept:
+    """Return the rows of a closure that say something, and those that say nothing anywhere.
 
     Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane. The combinations
     that are kept, and those that are not, come with them.
@@ -125,7 +134,8 @@ def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> _Split:
     J, length = J * loops.column_scale[anchored.columns], loops.length
     if not isinstance(anchored, AnchoredFrames):
         whole = np.eye(J.shape[1])
-        return (), (), J * anchored.row_scale(length, loops.column_scale)[:, None], (whole, whole[:0])
+        J = J * anchored.row_scale(length, loops.column_scale)[:, None]
+        return _Kept((), (), J, (whole, whole[:0]))
     rows = anchored.closure.rows
     kept: list[Row] = []
     left: list[Row] = []
@@ -138,15 +148,10 @@ def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> _Split:
         kept += joined_rows([rows[k] for k in some], mix)
         left += joined_rows([rows[k] for k in some], idle)
         scaled.append(np.matmul(mix, mine))
-        places = np.eye(len(rows))[some]
-        mixes[0].append(mix @ places)
-        mixes[1].append(idle @ places)
-    return (
-        tuple(kept),
-        tuple(left),
-        np.concatenate(scaled, axis=1),
-        (np.concatenate(mixes[0]), np.concatenate(mixes[1])),
-    )
+        for found, mixed in zip(mixes, (mix, idle), strict=True):
+            found.append(mixed @ np.eye(len(rows))[some])
+    both = np.concatenate(mixes[0]), np.concatenate(mixes[1])
+    return _Kept(tuple(kept), tuple(left), np.concatenate(scaled, axis=1), both)
 
 
 def _split(wide: Array) -> tuple[Array, Array]:
