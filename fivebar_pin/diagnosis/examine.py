@@ -15,17 +15,21 @@ from fivebar_pin.diagnosis.findings import (
     about_inertia,
     about_mobility,
     about_parts,
+    about_roads,
     about_singularity,
     jump,
     owners_of,
 )
 from fivebar_pin.diagnosis.report import ActuatedSet, Actuation, Diagnosis, Finding, RedundantRow, Severity
+from fivebar_pin.dynamics.inverse import roads_apart
 from fivebar_pin.dynamics.reactions import reactions
+from fivebar_pin.errors import InvalidInputError, SolverError
 from fivebar_pin.mechanism import mobility
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
+from fivebar_pin.mechanism.complement import rates_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
-from fivebar_pin.mechanism.rank import Decomposed, singular_values
+from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "diagnose"]
@@ -70,6 +74,8 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     sets = mobility.determining_sets(chain, generic if here.rank < generic.rank else here, _SETS)
     redundant = _redundant_rows(loops, here, generic)
     sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
+    apart = _roads_apart(chain, here) if actuation is Actuation.EXACT and sigma >= SINGULAR else None
+    findings += about_roads(apart)
     findings += about_mobility(chain, here, generic, redundant)
     findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
     findings += about_singularity(chain, here, generic, actuation, sigma)
@@ -93,6 +99,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         actuated_sets=tuple(ActuatedSet(names, value) for names, value in sets),
         sigma=sigma,
         amplification=_amplification(loops, here.J[0], sigma),
+        roads_apart=apart,
         determinate_joints=determinate[0],
         determinate_closures=determinate[1],
         determinate_rows=tuple(
@@ -187,6 +194,19 @@ def _amplification(loops: Loops, J: Array, sigma: float) -> float:
     scaled = loops.scaled(J)
     passive = Decomposed.of(scaled[None][:, :, loops.passive])
     return float(np.abs(passive.solve(scaled[:, loops.actuated].T, loops.passive.size)).max())
+
+
+def _roads_apart(chain: ClosedChain, site: Configurations) -> float | None:
+    """Return how far the two roads of inverse dynamics lie apart, all motors moving at unit speed and acceleration.
+
+    None where they have no torques to compare: springs whose ends meet, numbers beyond double precision.
+    """
+    unit = loops_of(chain).column_scale[chain.actuated_index][None]
+    try:
+        v, a, N = rates_of(site, unit, unit)
+        return roads_apart(chain, Trajectory(np.zeros(1), site.q, v, a, N, site.gap))
+    except (InvalidInputError, SolverError):
+        return None
 
 
 def _determinate(chain: ClosedChain, q: Array) -> tuple[Mask, Mask, Mask]:

@@ -22,6 +22,7 @@ __all__ = [
     "about_inertia",
     "about_mobility",
     "about_parts",
+    "about_roads",
     "about_singularity",
     "jump",
     "owners_of",
@@ -31,6 +32,7 @@ __all__ = [
 GIVEN = 1e-9  # residual up to which a given configuration counts as closed, and as within limits [m or rad]
 STILL = 1e-8  # scaled speed below which a joint counts as standing still [-]
 _NEAR = 1e-2  # distance to a type 2 singularity that is worth a warning [-]
+_ROADS = 1e-9  # difference of the two roads of inverse dynamics, of what adds up, that is no round-off [-]
 
 
 def jump(chain: ClosedChain, here: Configurations, generic: Configurations, where: str) -> str:
@@ -114,6 +116,16 @@ def about_singularity(
             "warning",
             f"a type 2 singularity is near: smallest scaled singular value {sigma:.2g}; torques and passive speeds get "
             "large here",
+        )
+
+
+def about_roads(apart: float | None) -> Iterator[Finding]:
+    """Find that the torques by the two roads are not the same."""
+    if apart is not None and not apart <= _ROADS:
+        yield Finding(
+            "error",
+            f"torques by Pinocchio and by the complement differ by {apart:.2g} of what adds up to them: neither is to "
+            "be trusted here. Check the inertias and placements of the model for numbers that lie far apart.",
         )
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.errors import UnknownNameError
 
-__all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "Severity"]
+__all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "Severity", "apart_in_words"]
 
 
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -112,6 +112,9 @@ class Diagnosis(Immutable):
         sigma: distance to the type 2 singularity: smallest singular value of the scaled passive columns here, zero
             where the actuated joints do not determine the motion [-].
         amplification: largest passive speed per unit actuated speed here, scaled [-]; infinite at the singularity.
+        roads_apart: largest difference of the motors' torques by Pinocchio and by the complement here, all motors
+            moving at unit speed and acceleration, in parts of what adds up to them [-]; None where the motors do not
+            determine the motion, and where there are no torques to compare.
         determinate_joints: which components of every joint's reaction are determinate (njoints - 1, 6).
         determinate_closures: the same for the closures (closures, 6), axes of frame 1; force before moment. A coupling
             of joints has no wrench and no component of one.
@@ -138,6 +141,7 @@ class Diagnosis(Immutable):
     actuated_sets: tuple[ActuatedSet, ...]
     sigma: float
     amplification: float
+    roads_apart: float | None
     determinate_joints: npt.NDArray[np.bool_]
     determinate_closures: npt.NDArray[np.bool_]
     determinate_rows: tuple[tuple[str, ...], ...]
@@ -195,6 +199,8 @@ def _lines(d: Diagnosis) -> Iterator[str]:
     if d.actuation in (Actuation.EXACT, Actuation.OVER):
         speeds = f"passive speeds up to {d.amplification:.3g} x the actuated" if d.sigma else "reached"
         yield _entry("type 2", f"singularity at distance {d.sigma:.3g} ({speeds})")
+    if d.roads_apart is not None:
+        yield _entry("torques", apart_in_words(d.roads_apart))
     for k, option in enumerate(d.actuated_sets[:_SHOWN]):
         yield _entry("" if k else "could drive", f"{', '.join(option.joints)} ({option.sigma:.3g})")
     yield "  determinate reactions, in the axes of the joint or of the first closure frame"
@@ -204,6 +210,11 @@ def _lines(d: Diagnosis) -> Iterator[str]:
     yield "  findings" if d.problems else _entry("findings", "none")
     for problem in d.problems:
         yield f"    {problem}"
+
+
+def apart_in_words(apart: float) -> str:
+    """Say how far the torques by the two roads lie apart, in parts of what adds up to them."""
+    return f"by Pinocchio and by the complement differ by {apart:.1g} of what adds up to them"
 
 
 def _entry(label: str, text: str) -> str:

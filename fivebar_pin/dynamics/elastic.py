@@ -17,7 +17,7 @@ from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.tree import Poses
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["SpringForces", "body_wrenches", "frame_points", "resting_force", "spring_forces"]
+__all__ = ["SpringForces", "body_wrenches", "frame_points", "resting_force", "spring_forces", "undirected"]
 
 _TOGETHER = 1e-12  # distance of a spring's ends that is round-off: they lie on one point [chain lengths]
 
@@ -89,6 +89,14 @@ def body_wrenches(chain: ClosedChain, loops: Loops, v: Array, poses: Poses) -> A
     return out
 
 
+def undirected(spring: str) -> SolverError:
+    """Make the error for a spring whose ends meet."""
+    return SolverError(
+        f"spring {spring} has its ends on one point: the direction of its force is not "
+        "defined there. Give it other frames, or a free length of zero and no damping."
+    )
+
+
 def frame_points(chain: ClosedChain, loops: Loops, frame: str, poses: Poses) -> tuple[Array, Array]:
     """Return a frame's world origin (n, 3) and the Jacobian of its twist at the world origin (n, 6, nv)."""
     found = find_frame(chain.model, frame)
@@ -128,10 +136,7 @@ def _pull(chain: ClosedChain, loops: Loops, spring: Spring, v: Array, poses: Pos
     stretch = size - spring.length
     free = spring.length == 0.0 and spring.damping == 0.0  # then the force is k d, without a direction to define
     if not free and np.any(size < _TOGETHER * chain.length):
-        raise SolverError(
-            f"spring {spring.name} has its ends on one point: the direction of its force is not "
-            "defined there. Give it other frames, or a free length of zero and no damping."
-        )
+        raise undirected(spring.name)
     u = np.divide(d, size[:, None], out=np.zeros_like(d), where=size[:, None] > 0.0)
     # rate of |d|, as a row over v: u . (v_2 - v_1)
     row = np.einsum("ni,nik->nk", u, _point(p2, J2) - _point(p1, J1))

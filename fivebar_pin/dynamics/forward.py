@@ -1,6 +1,7 @@
 """Forward dynamics of any closed chain, driven, under-driven or free.
 
-Accelerations come from the null space of the closure Jacobian, so every mobility is handled alike.
+Where the motors determine the motion, accelerations come from theirs; elsewhere from the null space of the closure
+Jacobian, so that every mobility is handled.
 """
 
 from __future__ import annotations
@@ -13,15 +14,18 @@ import numpy.typing as npt
 from fivebar_pin._arrays import TINY, Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.dynamics.motor_equations import motor_equations
 from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.closing import closed_enough
 from fivebar_pin.mechanism.configurations import Configurations
 
-__all__ = ["constant_torque", "forward_dynamics", "require_closed", "require_consistent"]
+__all__ = ["CLOSED", "constant_torque", "forward_dynamics", "require_closed", "require_consistent"]
 
 
-_CLOSED = 1e-8  # closure residual and velocity mismatch that a given state may have [-]
+_LIGHT = 1e-5  # diagonal of the factor of the reduced inertia, of unit diagonal, that is far from singular [-]
+CLOSED = 1e-8
+"""Closure residual and velocity mismatch that a given state may have [-]."""
 
 
 @finite()
@@ -37,7 +41,7 @@ def forward_dynamics(
 
     Gravity, armature, viscous damping, dry friction and springs are taken from the chain; dry friction is -f sign(v),
     none at rest, as in `inverse_dynamics` (`simulate` lets joints stick). The mechanism may have any number of motors:
-    the tangent space of the closures is used, not the actuated joints.
+    where they do not determine the motion, the tangent space of the closures is used in place of their coordinates.
 
     Args:
         chain: the mechanism.
@@ -56,7 +60,6 @@ def forward_dynamics(
         SingularityError: q is a bifurcation, where the motion is not determined.
         SolverError: a spring whose ends meet has a force of no direction.
     """
-    system = EquationsOfMotion.of(chain)
     Q = numeric("q", q)
     single = Q.ndim == 1
     Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
@@ -66,12 +69,40 @@ def forward_dynamics(
         return np.zeros((0, chain.nv))
     given = constant_torque(chain, tau)
     T = checked("tau", np.broadcast_to(given, (n, chain.na)) if given.shape == (chain.na,) else given, (n, chain.na))
-    point = system.manifold.at(Q)
-    require_consistent(point, V)
-    applied = system.wrench_forces(point, checked_wrenches(chain, external, n))
-    applied[:, chain.actuated_index] += T
-    a = system.accelerations(point, V, applied, system.manifold.rank_of(point))
+    acting = checked_wrenches(chain, external, n)
+    a = _by_motors(chain, Q, V, T, acting)
+    if a is None:
+        a = _by_tangent_space(chain, Q, V, T, acting)
     return np.asarray(a[0]) if single else a
+
+
+def _by_motors(chain: ClosedChain, q: Array, v: Array, tau: Array, external: Mapping[str, Array]) -> Array | None:
+    """Return accelerations from those of the motors; None where they do not determine the motion, or hardly."""
+    found = motor_equations(chain, q, v, external, CLOSED)
+    if found is None:
+        return None
+    size = np.sqrt(np.maximum(np.einsum("nii->ni", found.inertia), 0.0))
+    if not np.all(size > 0.0):
+        return None
+    unit = found.inertia / (size[:, :, None] * size[:, None, :])
+    try:
+        L = np.linalg.cholesky(unit)
+    except np.linalg.LinAlgError:
+        return None
+    if not np.all(np.einsum("nii->ni", L) > _LIGHT):
+        return None
+    free = np.linalg.solve(unit, ((tau - found.bias) / size)[..., None])[..., 0] / size
+    return np.asarray(found.rest + np.matmul(found.N, free[..., None])[..., 0])
+
+
+def _by_tangent_space(chain: ClosedChain, q: Array, v: Array, tau: Array, external: Mapping[str, Array]) -> Array:
+    """Return accelerations from the tangent space of the closures, whatever is driven."""
+    system = EquationsOfMotion.of(chain)
+    point = system.manifold.at(q)
+    require_consistent(point, v)
+    applied = system.wrench_forces(point, external)
+    applied[:, chain.actuated_index] += tau
+    return system.accelerations(point, v, applied, system.manifold.rank_of(point))
 
 
 def constant_torque(chain: ClosedChain, tau: npt.ArrayLike | None) -> Array:
@@ -92,7 +123,7 @@ def require_consistent(point: Configurations, v: Array) -> None:
     require_closed(point)
     u = v / loops.column_scale
     rate = point.independent.rate(u)
-    bound = _CLOSED * np.maximum(np.abs(u).max(axis=1), TINY)
+    bound = CLOSED * np.maximum(np.abs(u).max(axis=1), TINY)
     worst = int(np.argmax(rate - bound))
     if rate[worst] > bound[worst]:
         raise InvalidInputError(
@@ -111,11 +142,11 @@ def require_closed(point: Configurations) -> None:
     """
     loops = point.loops
     worst = int(np.argmax(point.gap)) if point.gap.size else 0
-    if loops.m and point.gap.size and not closed_enough(loops, point.gap, _CLOSED)[worst]:
+    if loops.m and point.gap.size and not closed_enough(loops, point.gap, CLOSED)[worst]:
         name, size = loops.worst(point.residual[worst])
         raise InvalidInputError(
             f"closure {name} at state {worst}",
             size,
-            f"must be below {_CLOSED:g} m or rad",
+            f"must be below {CLOSED:g} m or rad",
             "Use assemble, or simulate(initial='project').",
         )

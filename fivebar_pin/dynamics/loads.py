@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fivebar_pin._arrays import TINY, Array, Immutable, cross, figures, finite, frozen, settled
+from fivebar_pin._arrays import TINY, Array, Immutable, cross, figures, finite, frozen, seal, settled
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, inner, rotor_energy, sizes, speeds, total_centre
 from fivebar_pin.dynamics.elastic import SpringForces, spring_forces
@@ -21,6 +21,8 @@ from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["Loads"]
+
+_QUANTITIES = ("torque", "shaking_force", "shaking_moment", "frame_force", "frame_moment")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,8 +54,14 @@ class Loads(Immutable):
     tree_torque: Array = field(repr=False)
     external: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
+    def __post_init__(self) -> None:
+        for name in (*_QUANTITIES, "about", "tree_torque"):
+            getattr(self, name).setflags(write=False)
+        if self.external:
+            seal(self.external)
+
     def __repr__(self) -> str:
-        names = ("torque", "shaking_force", "shaking_moment", *(("frame_force", "frame_moment") if self.loaded else ()))
+        names = _QUANTITIES if self.loaded else _QUANTITIES[:3]
         words = ", ".join(f"{x} {figures(self.peak(x))}" for x in names)
         return f"Loads({len(self.trajectory)} samples; peaks: {words})"
 
@@ -225,7 +233,7 @@ class Loads(Immutable):
     def power_residual(self) -> float:
         """Return the largest mismatch between the power of the motors and the rate of energy, relative [-].
 
-        The rate of energy is summed body by body (Newton and Euler), the torque comes from Pinocchio. Friction,
+        The rate of energy is summed body by body (Newton and Euler), the torque comes by either road. Friction,
         rotors (armature), springs and external forces are accounted for.
         """
         r = self.reactions

@@ -41,25 +41,25 @@ class HangingTree:
         self._pool = pin.ModelPool(model, self._threads)
         self._nv = int(model.nv)
 
-    def inertia(self, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
+    def inertia(self, q: Array, v: Array, a: Array, threads: int | None = None) -> tuple[Array, Array]:
         """Return the wrench of the frame on the mechanism at the world origin (n, 6) and the torques (n, nv)."""
         V, A = (np.zeros((len(q), x.shape[1] + 6)) for x in (v, a))
         V[:, 6:], A[:, 6:] = v, a
-        return self._evaluate(q, V, A)
+        return self._evaluate(q, V, A, threads)
 
-    def weight(self, q: Array, gravity: Array) -> tuple[Array, Array]:
+    def weight(self, q: Array, gravity: Array, threads: int | None = None) -> tuple[Array, Array]:
         """Return the same of the weight alone: at rest, on a root that accelerates against gravity (3,)."""
         V = np.zeros((len(q), self._nv))
         A = np.zeros_like(V)
         A[:, :3] = -gravity
-        return self._evaluate(q, V, A)
+        return self._evaluate(q, V, A, threads)
 
-    def _evaluate(self, q: Array, V: Array, A: Array) -> tuple[Array, Array]:
+    def _evaluate(self, q: Array, V: Array, A: Array, most: int | None) -> tuple[Array, Array]:
         n = q.shape[0]
         Q = np.zeros((n, q.shape[1] + 7))
         Q[:, 6], Q[:, 7:] = 1.0, q
         out = np.zeros((self._nv, n), order="F")
-        threads = min(self._threads, 1 + n // _SAMPLES_PER_THREAD)
+        threads = min(self._threads, most or self._threads, 1 + n // _SAMPLES_PER_THREAD)
         pin.rneaInParallel(threads, self._pool, Q.T, V.T, A.T, out)
         return out[:6].T, np.array(out[6:].T)
 

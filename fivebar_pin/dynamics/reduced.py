@@ -13,9 +13,10 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.forward import require_closed
+from fivebar_pin.dynamics.forward import CLOSED, require_closed
 from fivebar_pin.dynamics.inverse import inverse_dynamics
 from fivebar_pin.dynamics.mass import depth_first, mass_matrix
+from fivebar_pin.dynamics.motor_equations import motor_equations
 from fivebar_pin.mechanism.complement import rates_of, require_regular
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
@@ -46,17 +47,26 @@ def reduced_dynamics(chain: ClosedChain, q: npt.ArrayLike, v_actuated: npt.Array
     loops, Q = loops_of(chain), numeric("q", q)
     loops.require_determined()
     single = Q.ndim == 1
-    here = Configurations(loops, checked("q", np.atleast_2d(Q), (None, chain.nq)))
-    n = here.q.shape[0]
-    va = checked("v_actuated", np.atleast_2d(numeric("v_actuated", v_actuated)), (n, chain.na))
+    Q = checked("q", np.atleast_2d(Q), (None, chain.nq))
+    va = checked("v_actuated", np.atleast_2d(numeric("v_actuated", v_actuated)), (Q.shape[0], chain.na))
+    v = np.zeros((Q.shape[0], chain.nv))
+    v[:, chain.actuated_index] = va
+    found = motor_equations(chain, Q, v, {}, CLOSED, driven=True)
+    M, bias = _by_all_coordinates(chain, Q, va) if found is None else (found.inertia, found.bias)
+    return (np.asarray(M[0]), np.asarray(bias[0])) if single else (M, np.asarray(bias))
+
+
+def _by_all_coordinates(chain: ClosedChain, q: Array, va: Array) -> tuple[Array, Array]:
+    """Return the same through the mass matrix and the inverse dynamics of the open tree."""
+    here = Configurations(loops_of(chain), q)
     require_closed(here)
     require_regular(here.passive.sigma)
     v, a, N = rates_of(here, va, np.zeros_like(va))
-    states = Trajectory(np.arange(float(n)), here.q, v, a, N, here.gap)
+    states = Trajectory(np.arange(float(len(q))), here.q, v, a, N, here.gap)
     bias = inverse_dynamics(chain, states).torque
     M = np.matmul(np.swapaxes(N, 1, 2), np.matmul(_mass_matrices(chain, here.q), N))
     M = 0.5 * (M + np.swapaxes(M, 1, 2))  # round-off would leave it unsymmetric, which factorisations mind
-    return (np.asarray(M[0]), np.asarray(bias[0])) if single else (M, np.asarray(bias))
+    return M, bias
 
 
 def _mass_matrices(chain: ClosedChain, q: Array) -> Array:

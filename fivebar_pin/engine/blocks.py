@@ -11,7 +11,7 @@ A = H_1 ... H_n R, H = 1 - w w^T; the others stand below the diagonal.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.compiled import compiled
@@ -44,10 +44,12 @@ from fivebar_pin.engine.tables import (
     X,
 )  # fmt: skip
 
-__all__ = ["combine", "factorise", "inverse_norm", "solve", "substitute"]
+__all__ = ["combine", "factorise", "inverse_norm", "least_pivot", "solve", "substitute", "substitute_back"]
 
 _EXPLICIT = 4  # columns up to which the inverse is made
 _ITERATIONS = 2  # of inverse iteration, which is warm: blocks change little from one sample to the next
+_STIRRED = 0.3  # part of a direction without any symmetry that is added to where it starts [-]
+_GOLDEN = 0.6180339887498949
 
 
 @compiled
@@ -185,7 +187,7 @@ def substitute(I: Integers, W: Array, g: int) -> None:
 
 
 @compiled
-def _substitute_back(I: Integers, W: Array, g: int) -> None:
+def substitute_back(I: Integers, W: Array, g: int) -> None:
     """Solve A^T x = rhs of a factorised square block in place; of a tall one R^T x = rhs."""
     n, b, A, pivots = I[g + WIDTH], I[RHS], I[g + FACTORS], I[g + PIVOTS]
     _upper_back(W, A, n, b)
@@ -234,7 +236,8 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
     """Return the size of the (pseudo-)inverse of a factorised block, scaled: one over its smallest singular value.
 
     Small square blocks: the Frobenius norm, which is at least as large. Others: inverse iteration on A^T A, which starts
-    from the weakest direction of the sample before, in `WEAK`, and leaves that of this one there.
+    from the weakest direction of the sample before, in `WEAK`, and leaves that of this one there. It is stirred: what was
+    weakest in a symmetric mechanism is often orthogonal to what will be.
     """
     n, b, weak, columns = I[g + WIDTH], I[RHS], I[g + WEAK], I[g + COLUMN_LIST]
     explicit = n <= _EXPLICIT and I[g + HEIGHT] == n
@@ -245,8 +248,9 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
                 W[b + i] = 1.0 if i == k else 0.0
         else:
             for i in range(n):
-                W[b + i] = W[weak + i] / W[I[SCALE] + I[columns + i]]
-            _substitute_back(I, W, g)
+                stir = _STIRRED * ((_GOLDEN * i) % 1.0 - 0.5) if k == 0 else 0.0
+                W[b + i] = (W[weak + i] + stir) / W[I[SCALE] + I[columns + i]]
+            substitute_back(I, W, g)
             size = sqrt(_square(W, b, n))
             for i in range(n):
                 W[b + i] /= size
@@ -259,8 +263,21 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
         size = _square(W, b, n)
         most = most + size if explicit else size
         for i in range(n):
-            W[weak + i] = W[b + i] / sqrt(size)
+            W[weak + i] = W[b + i] / sqrt(size) if size < inf else 1.0  # a singular block is not remembered
     return sqrt(most)
+
+
+@compiled
+def least_pivot(I: Integers, W: Array) -> float:
+    """Return the least pivot of all factors, scaled; zero where one is not a number."""
+    least = inf
+    for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
+        n = I[g + WIDTH]
+        for k in range(n):
+            size = abs(W[I[g + FACTORS] + k * n + k]) * W[I[SCALE] + I[I[g + COLUMN_LIST] + k]]
+            if not size >= least:
+                least = size if size > 0.0 else 0.0
+    return least
 
 
 @compiled

@@ -214,11 +214,11 @@ def joint_forces(I: Integers, W: Array) -> None:
 
 
 @compiled
-def reduced_inertia(I: Integers, W: Array, M: Array) -> None:
-    """Write M_bar = sum_i T_i^T M_i T_i + N^T diag(armature) N (na, na)."""
-    for a in range(I[NA]):
-        for b in range(I[NA]):
-            M[a, b] = 0.0
+def reduced_inertia(I: Integers, W: Array, M: int) -> None:
+    """Write M_bar = sum_i T_i^T M_i T_i + N^T diag(armature) N (na, na) from W[M] on, row by row."""
+    na = I[NA]
+    for k in range(M, M + na * na):
+        W[k] = 0.0
     for j in range(I[LINKS] + LINK_SIZE, I[LINKS_END], LINK_SIZE):
         for i in range(I[j + REACHED], I[j + REACHED_END]):
             p, h = _momentum(I, W, j, I[i])
@@ -226,9 +226,9 @@ def reduced_inertia(I: Integers, W: Array, M: Array) -> None:
                 t = I[j + TWIST] + 6 * I[k]
                 value = dot(p, vector_at(W, t + LINEAR)) + dot(h, vector_at(W, t + ANGULAR))
                 value += _rotors(I, W, j, I[i], I[k])
-                M[I[i], I[k]] += value
+                W[M + I[i] * na + I[k]] += value
                 if i != k:
-                    M[I[k], I[i]] += value
+                    W[M + I[k] * na + I[i]] += value
 
 
 @compiled

@@ -36,8 +36,9 @@ from fivebar_pin.engine.tables import (
     Integers,
 )  # fmt: skip
 from fivebar_pin.engine.tree import accelerate, move, place
+from fivebar_pin.engine.vectors import Vector
 
-__all__ = ["drive", "loads", "residual"]
+__all__ = ["drive", "loads", "need", "open_by", "read", "residual", "set_out"]
 
 
 @entry
@@ -85,48 +86,65 @@ def residual(I: Integers, W: Array, q: Array) -> float:
 @entry
 def loads(
     I: Integers, W: Array, q: Array, v: Array, a: Array, N: Array, about: Array,
-    links: Integers, points: Array, wrenches: Array, tau: Array, shaking: Array, carried: Array, joint: Array,
+    links: Integers, points: Array, wrenches: Array, table: Array,
 ) -> int:  # fmt: skip
-    """Write what the motors need (n, na), the shaking wrench and that of weight and forces from outside (n, 6).
+    """Write what motors need, what shakes the frame and what it carries, and what the joints of the open tree need.
 
     Args:
         I, W: the chain and working memory.
         q, v, a, N: consistent motion (n, ...).
         about: point of the moments (3,).
         links, points, wrenches: of forces from outside (k,), (k, 3), (n, k, 6).
-        tau, shaking, carried: are written.
-        joint: what the joints of the open tree need; is written (n, nv).
+        table: is written (n, na + 12 + nv): torques, shaking force and moment, frame force and moment, joint torques.
 
     Returns:
         Number of a spring whose force has no direction, else -1.
     """
-    centre, lost, i = (about[0], about[1], about[2]), -1, 0
+    centre, lost, i, na = (about[0], about[1], about[2]), -1, 0, I[NA]
     while lost < 0 and i < q.shape[0]:
         read(W, I[Q_HERE], q, i, I[NQ])
         read(W, I[V_HERE], v, i, I[NV])
         read(W, I[A_HERE], a, i, I[NV])
         k = I[N_HERE]
         for m in range(I[NV]):
-            for b in range(I[NA]):
+            for b in range(na):
                 W[k] = N[i, m, b]
                 k += 1
         place(I, W)
-        move(I, W)
-        accelerate(I, W)
         twists(I, W)
-        inertia_forces(I, W, centre)
-        weigh(I, W, centre)
-        drag(I, W)
-        lost = pull(I, W)
-        apply(I, W, links, points, wrenches, i, centre)
+        lost = need(I, W, centre, links, points, wrenches, i)
         torques(I, W)
         joint_forces(I, W)
-        write(W, I[TAU], tau, i, I[NA])
-        write(W, I[SHAKING], shaking, i, 6)
-        write(W, I[CARRIED], carried, i, 6)
-        write(W, I[JOINT], joint, i, I[NV])
+        for k in range(6):
+            W[I[CARRIED] + k] += W[I[SHAKING] + k]
+        set_out(W, I[TAU], table, i, 0, na)
+        set_out(W, I[SHAKING], table, i, na, 6)
+        set_out(W, I[CARRIED], table, i, na + 6, 6)
+        set_out(W, I[JOINT], table, i, na + 12, I[NV])
         i += 1
     return lost
+
+
+@compiled
+def need(
+    I: Integers, W: Array, about: Vector, links: Integers, points: Array, wrenches: Array, sample: int
+) -> int:  # fmt: skip
+    """Write what every link and every joint need to move as they do, in poses that stand there; see `loads`."""
+    move(I, W)
+    accelerate(I, W)
+    inertia_forces(I, W, about)
+    weigh(I, W, about)
+    drag(I, W)
+    lost = pull(I, W)
+    apply(I, W, links, points, wrenches, sample, about)
+    return lost
+
+
+@compiled
+def set_out(W: Array, at: int, table: Array, i: int, column: int, count: int) -> None:
+    """Copy working memory into row i of a table, from a column on."""
+    for k in range(count):
+        table[i, column + k] = W[at + k]
 
 
 @compiled

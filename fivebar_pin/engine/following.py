@@ -77,6 +77,7 @@ from fivebar_pin.engine.tables import (
     TARGET,
     TO,
     UNIT,
+    WEAK,
     WIDTH,
     WRENCH,
     Integers,
@@ -105,7 +106,7 @@ def advance(I: Integers, W: Array, first: bool) -> None:
     if first:
         W[I[REACH]], W[I[LAST_STEP]], W[I[SECOND_STEP]] = inf, 0.0, 0.0
     total = 0.0 if first else _distance(I, W)
-    done = 0.0 if first or total > 0.0 else 1.0
+    done = 1.0 if not first and total == 0.0 else 0.0
     step = min(1.0, 2.0 * W[I[REACH]] / total) if total > 0.0 else 1.0
     W[I[STATUS]] = FOLLOWED
     while done < 1.0 and W[I[STATUS]] == FOLLOWED:
@@ -128,7 +129,7 @@ def advance(I: Integers, W: Array, first: bool) -> None:
         else:
             _copy_state(I, W, I[Q_BEFORE], I[Q_HERE], I[J_BEFORE], I[J_HERE], I[SIGNS_BEFORE], I[SIGNS])
             step *= 0.5
-            if step * total < _SHORTEST:
+            if not step * total >= _SHORTEST:  # it is not, either, where a motor goes to what is no number
                 W[I[STATUS]] = BLOCKED
     for a in range(I[NA]):
         W[I[TARGET] + a] = W[I[TO] + a]
@@ -222,6 +223,9 @@ def _certify(I: Integers, W: Array, first: bool) -> None:
     """Take the flag `CLOSED` down unless this point and the one before are on one branch; write the inverses' norms."""
     for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
         number = I[g + NUMBER]
+        if first:  # whatever this memory was used for before
+            for i in range(I[g + WEAK], I[g + WEAK] + I[g + WIDTH]):
+                W[i] = 1.0
         norm = W[I[NORMS] + number] = inverse_norm(I, W, g)
         if not first:
             turned = W[I[SIGNS] + number] != W[I[SIGNS_BEFORE] + number]

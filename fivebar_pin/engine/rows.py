@@ -84,7 +84,7 @@ from fivebar_pin.engine.vectors import (
     vector_at,
 )  # fmt: skip
 
-__all__ = ["drifts", "jacobian", "look", "motion_of_point", "rotation_vector"]
+__all__ = ["drifts", "frame_of", "jacobian", "look", "motion_of_point", "rotation_vector"]
 
 _SMALL = 1e-3  # angle below which a series is exact to round-off [rad]
 

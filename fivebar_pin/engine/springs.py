@@ -65,12 +65,12 @@ __all__ = ["apply", "pull"]
 
 @compiled
 def pull(I: Integers, W: Array) -> int:
-    """Add what holds against all springs; return the number of one whose force has no direction, else -1."""
+    """Add what holds against all springs; return the number of the first whose force has no direction, else -1."""
     lost = -1
     for s in range(I[SPRINGS], I[SPRINGS_END], SPRING_SIZE):
         coil = I[s + COIL]
         if I[s + SPRING_SORT] == BETWEEN:
-            if not _between(I, W, s, coil):
+            if not _between(I, W, s, coil) and lost < 0:
                 lost = (s - I[SPRINGS]) // SPRING_SIZE
         else:
             k = I[s + POSE_A]  # of its joint

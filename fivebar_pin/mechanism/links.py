@@ -65,12 +65,12 @@ class _Part:
     pitch: float = 1.0
 
 
-_TURN, _SHIFT, _TWIST = ((2, motion) for motion in (e.TURN, e.SHIFT, e.HELIX))
+_TURN, _SHIFT, _HELIX = ((2, motion) for motion in (e.TURN, e.SHIFT, e.HELIX))
 _COLUMNS: dict[int, tuple[tuple[int, int], ...]] = {
     e.REVOLUTE: (_TURN,),
     e.TURNING: (_TURN,),
     e.SLIDE: (_SHIFT,),
-    e.SCREW: (_TWIST,),
+    e.SCREW: (_HELIX,),
     e.BALL: tuple((k, e.TURN) for k in range(3)),
     e.PLANAR: ((0, e.SHIFT), (1, e.SHIFT), _TURN),
     e.FREE: (*((k, e.SHIFT) for k in range(3)), *((k, e.TURN) for k in range(3))),

@@ -88,7 +88,7 @@ class _AllCoordinates:
 
 
 def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array, float]:
-    """Find a closed configuration from the neutral one, else from random ones; the best one found if none closes.
+    """Find a closed configuration from the neutral one, else the first from random ones; the best one if none closes.
 
     Returns:
         The configuration (nq,) and its largest residual [m or rad].
@@ -102,7 +102,8 @@ def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array
     tangent = rng.uniform(-np.pi, np.pi, (count, loops.tree.nv)) * loops.column_scale
     q, sizes = close_all(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), tolerance)
     q, sizes = np.concatenate([best, q]), np.concatenate([residual, sizes])
-    k = int(np.argmin(sizes))
+    closed = np.flatnonzero(closed_enough(loops, sizes, tolerance))
+    k = int(closed[0] if closed.size else np.argmin(sizes))  # which of the closed ones is best is round-off
     return q[k], float(gap(loops, q[k : k + 1])[0])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
-from fivebar_pin.engine.tables import NQ, Integers
+from fivebar_pin.engine.tables import NA, NQ, Integers
 from fivebar_pin.mechanism.layout import Index, Parts, blocks_of, joined_rows, layout_of
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.loops import Loops, loops_of
@@ -36,18 +37,23 @@ class Prepared:
         turns: which motors come back to the same pose after a whole turn, and which of these do not count turns (na,) each.
         left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they are
             [m, rad or -].
+        mixed: the rows of the engine as orthonormal combinations of those of the closures, both scaled (rows, m).
+        vanishing: the other combinations, which say nothing anywhere, each of rows of one sort of one closure (k, m).
     """
 
-    def __init__(self, vectors: tuple[Integers, Array], turns: tuple[Flags, Flags], left: float) -> None:
+    def __init__(
+        self, vectors: tuple[Integers, Array], turns: tuple[Flags, Flags], left: float, mixes: tuple[Array, Array]
+    ) -> None:
         (self.I, self.W), self.turns, self.left = vectors, turns, left
+        self.mixed, self.vanishing = mixes
         self.nq = int(self.I[NQ])
-        seal((*vectors, *turns))
+        seal((*vectors, *turns, *mixes))
         self._threads = threading.local()
 
     def memory(self) -> Array:
-        """Return the working memory of this thread."""
+        """Return the working memory of this thread; behind it is room for a matrix of the motors."""
         if not hasattr(self._threads, "W"):
-            self._threads.W = np.array(self.W)
+            self._threads.W = np.concatenate([self.W, np.zeros(int(self.I[NA]) ** 2)])
         found: Array = self._threads.W
         return found
 
@@ -56,30 +62,36 @@ class Prepared:
 def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
     loops = loops_of(chain)
-    return Prepared(layout_of(parts_of(chain)), _turns(chain, loops), loops.left)
+    parts, mixes = _taken_apart(loops, chain)
+    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, mixes)
 
 
 def parts_of(chain: ClosedChain) -> Parts:
     """Return what the tables of a chain are made of: independent rows, and the blocks they make."""
-    loops = loops_of(chain)
+    return _taken_apart(loops_of(chain), chain)[0]
+
+
+def _taken_apart(loops: Loops, chain: ClosedChain) -> tuple[Parts, tuple[Array, Array]]:
+    """Return the parts of a chain, and the combinations of all rows that are kept and that vanish."""
     kept = [_independent_rows(c, J, loops) for c, J in zip(loops.anchored, loops.generic_jacobians, strict=True)]
-    starts = np.cumsum([0, *(J.shape[1] for _, _, J in kept)])
-    touched = [c.columns for c, (_, _, J) in zip(loops.anchored, kept, strict=True) for _ in range(J.shape[1])]
+    starts = np.cumsum([0, *(x.J.shape[1] for x in kept)])
+    touched = [c.columns for c, x in zip(loops.anchored, kept, strict=True) for _ in range(x.J.shape[1])]
     systems = []
     for group in loops.independent:
         rows = np.concatenate([np.arange(starts[k], starts[k + 1]) for k in group.members])
-        wide = [_spread(kept[k][2], loops.anchored[k].columns, chain.nv) for k in group.members]
+        wide = [_spread(kept[k].J, loops.anchored[k].columns, chain.nv) for k in group.members]
         systems.append((rows, loops.passive[group.passive], _combinations(np.concatenate(wide))))
-    return Parts(
+    parts = Parts(
         chain,
         links_of(chain.model),
         loops.anchored,
-        [rows for rows, _, _ in kept],
+        [x.rows for x in kept],
         blocks_of(systems, touched, chain.actuated_index),
         loops.column_scale,
         loops.length,
-        [left for _, left, _ in kept],
+        [x.left for x in kept],
     )
+    return parts, _mixes(loops, [x.mixes for x in kept])
 
 
 def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
@@ -91,18 +103,44 @@ def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
     return np.array(whole, dtype=np.bool_), np.array([loops.tree.is_cyclic(k) for k in motors], dtype=np.bool_)
 
 
-def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple[Row, ...], tuple[Row, ...], Array]:
-    """Return the rows of a closure that say something, those that say nothing anywhere, and the scaled Jacobian.
+def _mixes(loops: Loops, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Return the combinations of the rows of each closure as combinations of all rows: those kept, those that vanish."""
+    found = []
+    for some in zip(*parts, strict=True):
+        spread = np.zeros((sum(len(x) for x in some), loops.m))
+        start = 0
+        for c, mix in zip(loops.anchored, some, strict=True):
+            spread[start : start + len(mix), c.rows], start = mix, start + len(mix)
+        found.append(spread)
+    kept, vanishing = found if found else (np.zeros((0, 0)), np.zeros((0, 0)))
+    return kept, vanishing
 
-    Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane.
+
+class _Kept(NamedTuple):
+    """What is kept of the rows of a closure, what says nothing, the scaled Jacobian, and both as combinations."""
+
+    rows: tuple[Row, ...]
+    left: tuple[Row, ...]
+    J: Array
+    mixes: tuple[Array, Array]
+
+
+def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> _Kept:
+    """Return the rows of a closure that say something, and those that say nothing anywhere.
+
+    Rows of one sort are combined: in a planar loop three rows along the axes become two in the plane. The combinations
+    that are kept, and those that are not, come with them.
     """
     J, length = J * loops.column_scale[anchored.columns], loops.length
     if not isinstance(anchored, AnchoredFrames):
-        return (), (), J * anchored.row_scale(length, loops.column_scale)[:, None]
+        whole = np.eye(J.shape[1])
+        J = J * anchored.row_scale(length, loops.column_scale)[:, None]
+        return _Kept((), (), J, (whole, whole[:0]))
     rows = anchored.closure.rows
     kept: list[Row] = []
     left: list[Row] = []
     scaled: list[Array] = []
+    mixes: tuple[list[Array], list[Array]] = [], []
     for sort in dict.fromkeys((row.sort, row.other.tobytes()) for row in rows):
         some = [k for k, row in enumerate(rows) if (row.sort, row.other.tobytes()) == sort]
         mine = J[:, some] * (1.0 / length if sort[0] in ("along", "length") else 1.0)
@@ -110,7 +148,10 @@ def _independent_rows(anchored: Anchored, J: Array, loops: Loops) -> tuple[tuple
         kept += joined_rows([rows[k] for k in some], mix)
         left += joined_rows([rows[k] for k in some], idle)
         scaled.append(np.matmul(mix, mine))
-    return tuple(kept), tuple(left), np.concatenate(scaled, axis=1)
+        for found, mixed in zip(mixes, (mix, idle), strict=True):
+            found.append(mixed @ np.eye(len(rows))[some])
+    both = np.concatenate(mixes[0]), np.concatenate(mixes[1])
+    return _Kept(tuple(kept), tuple(left), np.concatenate(scaled, axis=1), both)
 
 
 def _split(wide: Array) -> tuple[Array, Array]:
@@ -133,7 +174,7 @@ def _spread(J: Array, columns: Index, nv: int) -> Array:
     """Return rows of a closure at all samples side by side, in all columns (rows, n nv)."""
     whole = np.zeros((J.shape[1], J.shape[0], nv))
     whole[:, :, columns] = np.swapaxes(J, 0, 1)
-    return whole.reshape(J.shape[1], -1)
+    return whole.reshape(J.shape[1], J.shape[0] * nv)
 
 
 def _combinations(wide: Array) -> Array | None:

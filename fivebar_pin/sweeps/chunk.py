@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, frozen, seal
+from fivebar_pin.dynamics.by_complement import told_by_closures
 from fivebar_pin.engine.tables import NA, NV, STATUS
 from fivebar_pin.sweeps.problem import Problem
 from fivebar_pin.sweeps.result import Status
@@ -54,10 +55,11 @@ class _Bench:
         self.q0 = np.empty((1, nq))
         self.q, self.v, self.a = np.empty((n, nq)), np.empty((n, nv)), np.empty((n, nv))
         self.N, self.gap = np.empty((n, nv, na)), np.empty(n)
-        self.tau, self.shaking, self.carried, self.tree = (np.empty((n, w)) for w in (na, 6, 6, nv))
+        self.table = np.empty((n, na + 12 + nv))
+        self.told = told_by_closures(problem.chain)
         motion = problem.motion
         self.q_a, self.v_a, self.a_a = frozen(motion.q), frozen(motion.v), frozen(motion.a)
-        self.nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((n, 0, 6))
+        self.nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((1, 0, 6))
         seal(self.nothing)
         self.path = tuple(_seen(x) for x in (self.q, self.v, self.a, self.N))
         self.moved: tuple[Status, int] | None = None
@@ -99,7 +101,10 @@ class _Bench:
 
         self.W[: constants.size] = constants
         I, (q, v, a, N), outside, about = self.tables.I, self.path, self.nothing, self.problem.about
-        lost = loads(I, self.W, q, v, a, N, about, *outside, self.tau, self.shaking, self.carried, self.tree)
+        lost = loads(I, self.W, q, v, a, N, about, *outside, self.table)
+        if not self.told:
+            tree = self.table[:, self.na + 12 :, None]
+            self.table[:, : self.na] = np.matmul(np.swapaxes(self.N, 1, 2), tree)[..., 0]
         return bool(lost < 0)
 
     def _leaves_the_plane(self, sample: int) -> bool:
@@ -111,14 +116,14 @@ class _Bench:
 
     def tell(self, series: dict[str, Array], i: int) -> None:
         """Write what was computed where it is wanted."""
-        frame = self.shaking + self.carried
+        na, table = self.na, self.table
         found = {
-            "torque": self.tau,
-            "power": self.tau * self.v[:, self.motors],
-            "shaking_force": self.shaking[:, :3],
-            "shaking_moment": self.shaking[:, 3:],
-            "frame_force": frame[:, :3],
-            "frame_moment": frame[:, 3:],
+            "torque": table[:, :na],
+            "power": table[:, :na] * self.v[:, self.motors],
+            "shaking_force": table[:, na : na + 3],
+            "shaking_moment": table[:, na + 3 : na + 6],
+            "frame_force": table[:, na + 6 : na + 9],
+            "frame_moment": table[:, na + 9 : na + 12],
             "q": self.q,
             "v": self.v,
             "a": self.a,
