@@ -70,7 +70,7 @@ def tilted_delta() -> fb.ClosedChain:
     first = chain.joints[0]
     elbow = next(chain.model.names[j] for j in range(1, chain.model.njoints) if chain.model.parents[j] == 1)
     moves = {first: [("askew", [0, 0, 0, 0, 0, 1.0])], elbow: [("arm", [1.0, 0, 0, 0, 0, 0])]}
-    return placed(chain, moves, askew=0.0, arm=0.0)
+    return placed(chain, moves, askew=0.3, arm=0.07)
 
 
 CHAINS = {"five": five_bar, "six": six_bar, "slider": slider, "delta": tilted_delta}
@@ -143,7 +143,7 @@ def test_designs_have_the_constants_of_their_chains_to_the_last_digit(name):
 def test_the_last_point_of_the_way_to_a_design_is_the_design():
     chain = CHAINS["delta"]()
     rng = np.random.default_rng(2)
-    values = {"askew": rng.uniform(-1.0, 1.0, 50), "arm": rng.uniform(-0.05, 0.05, 50)}
+    values = {"askew": rng.uniform(-1.0, 1.0, 50), "arm": rng.uniform(0.03, 0.1, 50)}
     nothing = (np.full(chain.nq, -np.inf), np.full(chain.nq, np.inf))
     asked = (chain, home(chain), motion_of(chain), 50, values, None, terms_of("q"), np.zeros(3), nothing)
     problem = Problem(*asked)
@@ -345,7 +345,7 @@ def test_threads_and_neighbours_change_no_digit():
 
 def test_blocks_of_any_size_know_nothing_of_the_design_before():
     chain = tilted_delta()
-    values = {"askew": np.linspace(-0.2, 0.2, 12), "arm": np.linspace(0.03, -0.03, 12)}
+    values = {"askew": np.linspace(0.1, 0.5, 12), "arm": np.linspace(0.1, 0.04, 12)}
     one = fb.sweep(chain, motion_of(chain), parameters=values, of="torque", near=home(chain))
     back = fb.sweep(chain, motion_of(chain), parameters={k: x[::-1] for k, x in values.items()}, of="torque")
     assert one.ok.all() and np.array_equal(one["torque"], back["torque"][::-1])
