@@ -20,7 +20,7 @@ from fivebar_pin.engine.tables import NA, NV
 from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 from fivebar_pin.trajectory import Trajectory
 
-__all__ = ["by_complement", "told_by_closures"]
+__all__ = ["by_complement"]
 
 
 def by_complement(

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, frozen, seal
-from fivebar_pin.dynamics.by_complement import told_by_closures
+from fivebar_pin.dynamics.compiled_calls import told_by_closures
 from fivebar_pin.engine.tables import NA, NV, STATUS
 from fivebar_pin.sweeps.problem import Problem
 from fivebar_pin.sweeps.result import Status
