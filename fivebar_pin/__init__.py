@@ -5,6 +5,7 @@
     chain = fb.load("robot.urdf")                       # open tree + sidecar with the loop closures
     trajectory = fb.drive(chain, motion)                # the whole mechanism from its actuated joints
     loads = fb.inverse_dynamics(chain, trajectory)      # torque, shaking force and moment, reactions
+    evaluator = fb.Evaluator(chain)                     # the same one sample at a time, for a controller
     design = fb.balance(chain, "force")                 # the optimal mass distribution, or the proof of none
 
 Sub-packages: `fb.planar` (linkages in their own words), `fb.paper` (the planar five-bar in closed form),
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from fivebar_pin.balancing import BalanceConditions, Design, balance, balance_conditions, pareto, score
     from fivebar_pin.chain import ClosedChain, Visual
     from fivebar_pin.closures import Closure
+    from fivebar_pin.control import Evaluator
     from fivebar_pin.diagnosis import Diagnosis, diagnose
     from fivebar_pin.dynamics import Loads, energy_balance, forward_dynamics, inverse_dynamics, reduced_dynamics
     from fivebar_pin.errors import FiveBarPinError
@@ -42,6 +44,7 @@ __all__ = [
     "Closure",
     "Design",
     "Diagnosis",
+    "Evaluator",
     "FiveBarPinError",
     "JointSpring",
     "Loads",
@@ -82,6 +85,7 @@ _LATE = {
     "balancing": ("BalanceConditions", "Design", "balance", "balance_conditions", "pareto", "score"),
     "chain": ("ClosedChain", "Visual"),
     "closures": ("Closure", "ClosureKind"),
+    "control": ("Evaluator",),
     "diagnosis": ("Diagnosis", "diagnose"),
     "dynamics": ("Loads", "energy_balance", "forward_dynamics", "inverse_dynamics", "reduced_dynamics"),
     "errors": ("FiveBarPinError",),

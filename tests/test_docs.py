@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = ("extending", "sweeps")  # whose sections run each by itself
+PAGES = ("extending", "control", "sweeps")  # whose sections run each by itself
 
 
 def sections(page: Path) -> dict[str, str]:
@@ -23,8 +23,9 @@ def sections(page: Path) -> dict[str, str]:
     return {heading: code for heading, code in blocks.items() if code}
 
 
-def test_the_page_has_its_sections():
+def test_the_pages_have_their_sections():
     assert "A closure kind" in sections(DOCS / "extending.md")
+    assert "Computed torque" in sections(DOCS / "control.md")
 
 
 @pytest.mark.parametrize(("page", "heading"), [(p, h) for p in PAGES for h in sections(DOCS / f"{p}.md")])

@@ -26,7 +26,7 @@ ORDER = (
     ("engine",),
     ("mechanism",),
     ("kinematics", "dynamics"),
-    ("simulation", "diagnosis", "balancing", "io", "paper", "sweeps"),
+    ("control", "simulation", "diagnosis", "balancing", "io", "paper", "sweeps"),
     ("shipped", "planar"),
     ("viz",),
     ("cli",),

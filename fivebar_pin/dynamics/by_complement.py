@@ -14,9 +14,9 @@ import numpy as np
 
 from fivebar_pin._arrays import Array, require_finite
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.compiled_calls import compact, in_pieces, outside, told_by_closures
+from fivebar_pin.dynamics.compiled_calls import in_pieces, outside, told_by_closures
 from fivebar_pin.dynamics.loads import Loads
-from fivebar_pin.engine.tables import NA, NV
+from fivebar_pin.engine.tables import NA, NV, unwritten
 from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 from fivebar_pin.trajectory import Trajectory
 
@@ -59,7 +59,7 @@ def _fill(
     """Write the table of `engine.entries.loads`."""
     from fivebar_pin.engine.entries import loads
 
-    q, v, a, N = (compact(x) for x in (path.q, path.v, path.a, path.N))
+    q, v, a, N = (unwritten(x) for x in (path.q, path.v, path.a, path.N))
     links, points, wrenches = outside(chain, external, len(table))
 
     def work(k: slice) -> int:

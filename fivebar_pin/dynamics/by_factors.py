@@ -17,8 +17,8 @@ from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
-from fivebar_pin.dynamics.compiled_calls import compact, in_pieces, outside, told_by_closures
-from fivebar_pin.engine.tables import BLOCK_SIZE, BLOCKS, BLOCKS_END, LINK_SIZE, LINKS, MIX, Integers
+from fivebar_pin.dynamics.compiled_calls import in_pieces, outside, told_by_closures
+from fivebar_pin.engine.tables import BLOCK_SIZE, BLOCKS, BLOCKS_END, LINK_SIZE, LINKS, MIX, Integers, unwritten
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
@@ -123,7 +123,7 @@ def carried_by_factors(
     from fivebar_pin.engine.reactions import reactions
 
     prepared, n = prepared_of(chain), len(trajectory)
-    q, v, a = (compact(x) for x in (trajectory.q, trajectory.v, trajectory.a))
+    q, v, a = (unwritten(x) for x in (trajectory.q, trajectory.v, trajectory.a))
     links, points, wrenches = outside(chain, external, n)
     forces, carried = np.empty((n, len(prepared.mixed))), np.empty((n, 6 * len(structure.reach)))
     left, weakest = np.empty((n, chain.nv)), np.empty(n)
@@ -153,8 +153,8 @@ def seen_by_structure(
     """
     from fivebar_pin.engine.reactions import marks
 
-    prepared, q, s = prepared_of(chain), compact(q), structure
-    given = compact(carried.reshape(len(q), -1))
+    prepared, q, s = prepared_of(chain), unwritten(q), structure
+    given = unwritten(carried.reshape(len(q), -1))
     seen, limits = np.empty(given.shape), np.square(bounds)
 
     def work(k: slice) -> int:

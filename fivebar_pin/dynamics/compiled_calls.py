@@ -15,7 +15,7 @@ from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.prepared import prepared_of
 
-__all__ = ["CHUNK", "Outside", "compact", "in_pieces", "outside", "told_by_closures"]
+__all__ = ["CHUNK", "Outside", "in_pieces", "outside", "told_by_closures"]
 
 Outside = tuple[Integers, Array, Array]
 """Forces from outside as the engine takes them: links (k,), points in their axes (k, 3), wrenches (n, k, 6)."""
@@ -38,14 +38,6 @@ def in_pieces(chain: ClosedChain, n: int, threads: int | None, work: Callable[[s
     found = [spring for spring in lost if spring >= 0]
     if found:
         raise undirected(chain.springs[min(found)].name)
-
-
-def compact(rows: Array) -> Array:
-    """Return an array row by row in memory, as the engine's compiled code was made for."""
-    if not rows.flags.c_contiguous:
-        rows = np.ascontiguousarray(rows)
-        rows.setflags(write=False)
-    return rows
 
 
 def outside(chain: ClosedChain, external: Mapping[str, Array], n: int) -> Outside:

@@ -82,7 +82,7 @@ def inverse_dynamics(
     if threads is not None:
         integer("threads", threads, least=1)
     point = _AT_ORIGIN if about is _ORIGIN else checked("about", about, (3,))
-    applied = checked_wrenches(chain, external, len(trajectory)) if external else {}
+    applied = checked_wrenches(chain, external, len(trajectory))
     return ROADS[road](chain, trajectory, point, applied, threads)
 
 

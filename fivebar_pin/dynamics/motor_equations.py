@@ -12,7 +12,8 @@ import numpy as np
 
 from fivebar_pin._arrays import TINY, Array, Immutable
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.dynamics.compiled_calls import compact, in_pieces, outside, told_by_closures
+from fivebar_pin.dynamics.compiled_calls import in_pieces, outside, told_by_closures
+from fivebar_pin.engine.tables import unwritten
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.prepared import prepared_of
 
@@ -60,7 +61,7 @@ def motor_equations(
 
     prepared, n, na, nv = prepared_of(chain), len(q), chain.na, chain.nv
     links, points, wrenches = outside(chain, external, n)
-    q, v = compact(q), compact(v)
+    q, v = unwritten(q), unwritten(v)
     N, M, bias, rest = (np.empty((n, *shape)) for shape in ((nv, na), (na, na), (na,), (nv,)))
     states = np.empty((n, STATES))
 

@@ -14,7 +14,7 @@ from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_w
 from fivebar_pin.dynamics.by_factors import carried_by_factors, seen_by_structure, structure_of
 from fivebar_pin.dynamics.elastic import body_wrenches
 from fivebar_pin.dynamics.wrenches import moved_to_origin
-from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.loops import Loops, Seen, loops_of
 from fivebar_pin.mechanism.prepared import prepared_of
 from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.mechanism.tree import Poses
@@ -127,6 +127,10 @@ class Reactions(Immutable):
         return loops_of(self.chain).tree.poses(self.trajectory.q)
 
     @lazy
+    def _closures(self) -> Seen:
+        return loops_of(self.chain).see(self.trajectory.q)
+
+    @lazy
     def _in_world(self) -> Array:
         return self._seen(turned=False)
 
@@ -141,7 +145,7 @@ class Reactions(Immutable):
         if structure is not None:
             seen = seen_by_structure(chain, structure, self.trajectory.q, self.wrench, bounds, turned=turned)
         else:
-            points, axes = _places(loops_of(chain), self._poses)
+            points, axes = _places(loops_of(chain), self._closures, self._poses)
             seen, slack = np.array(self.wrench), _at_point(self._slack, points[:, None])
             if turned:
                 seen, slack = _turned(seen, axes), _turned(slack, axes[:, None])
@@ -154,7 +158,7 @@ class Reactions(Immutable):
         """What unit strains of the redundant closures put into joints and closures, at the world origin."""
         loops, (n, k, _) = loops_of(self.chain), self.vanishing.shape
         strains = self.vanishing * loops.row_scale * loops.length
-        closures = _wrenches(loops, self._poses, strains)
+        closures = _wrenches(loops, self._closures, strains)
         joints = _carried(self.chain, loops, np.zeros((n, k, self._bodies, 6)), closures)
         return np.concatenate([joints, closures], axis=2)
 
@@ -201,18 +205,17 @@ def _by_decomposition(chain: ClosedChain, path: Trajectory, unbalanced: Array, e
     tree = loops.tree
     poses = tree.poses(path.q)
     seen = loops.see(path.q)
-    J = seen.J
-    decomposed = Decomposed.of(loops.scaled(J))
+    decomposed = Decomposed.of(loops.scaled(seen.J))
     ranks = decomposed.ranks
     multipliers = decomposed.carry(unbalanced * loops.column_scale, ranks) * loops.row_scale
     moving = body_rates(tree, Bodies.of(chain), poses, tree.rates(path.q, path.v), path.a)
     needed = moving.rate - gravity_wrenches(Bodies.of(chain), moving.centre, np.array(chain.model.gravity.linear))
     needed -= moved_to_origin(chain, poses, external).on_bodies(needed.shape[1])
     needed -= body_wrenches(chain, loops, path.v, poses)
-    closures = _wrenches(loops, poses, multipliers[:, None])[:, 0]
+    closures = _wrenches(loops, seen, multipliers[:, None])[:, 0]
     wrench = np.concatenate([_carried(chain, loops, needed, closures), closures], axis=1)
-    mismatch = float(np.abs(unbalanced - np.einsum("nmk,nm->nk", J, multipliers)).max(initial=0.0))
-    return multipliers, decomposed.left_null(ranks), _at_point(wrench, _places(loops, poses)[0]), mismatch
+    mismatch = float(np.abs(unbalanced - np.einsum("nmk,nm->nk", seen.J, multipliers)).max(initial=0.0))
+    return multipliers, decomposed.left_null(ranks), _at_point(wrench, _places(loops, seen, poses)[0]), mismatch
 
 
 def determinate(free: Array) -> Array:
@@ -225,20 +228,19 @@ def determinate(free: Array) -> Array:
     return np.asarray(np.eye(3) - np.matmul(np.swapaxes(lost, -1, -2), lost))
 
 
-def _places(loops: Loops, poses: Poses) -> tuple[Array, Array]:
+def _places(loops: Loops, seen: Seen, poses: Poses) -> tuple[Array, Array]:
     """Return the points (n, x, 3) and the axes (n, x, 3, 3) of all joints, then of all closures."""
-    seen = loops.see(poses.q)
     closures = [c.place(seen.pair(k)) for k, c in enumerate(loops.anchored)]
     points = [*poses.p[1:], *(point for point, _ in closures)]
     axes = [*poses.R[1:], *(turn for _, turn in closures)]
     return np.stack(points, axis=1), np.stack(axes, axis=1)
 
 
-def _wrenches(loops: Loops, poses: Poses, rows: Array) -> Array:
+def _wrenches(loops: Loops, seen: Seen, rows: Array) -> Array:
     """Return what forces in the rows (n, k, m) do to body 2 of every closure, at the world origin (n, k, nc, 6)."""
-    out, T = np.zeros((*rows.shape[:2], len(loops.anchored), 6)), loops.see(poses.q).T
+    out = np.zeros((*rows.shape[:2], len(loops.anchored), 6))
     for c, anchored in enumerate(loops.anchored):
-        out[:, :, c] = np.einsum("nmi,nkm->nki", T[:, anchored.rows], rows[..., anchored.rows])
+        out[:, :, c] = np.einsum("nmi,nkm->nki", seen.T[:, anchored.rows], rows[..., anchored.rows])
     return out
 
 

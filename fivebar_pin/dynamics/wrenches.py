@@ -98,6 +98,8 @@ def checked_wrenches(chain: ClosedChain, external: Mapping[str, npt.ArrayLike] |
         InvalidInputError: a wrong shape, or not finite.
     """
     given = external or {}
+    if not given:
+        return {}
     require_frames(chain, given)
     out = {}
     for name, wrench in given.items():

@@ -11,7 +11,7 @@ from __future__ import annotations
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.entries import read, write
-from fivebar_pin.engine.rows import drifts, frame_of, jacobian, look
+from fivebar_pin.engine.rows import axes_of, drifts, jacobian, look, point_of
 from fivebar_pin.engine.tables import (
     A_HERE,
     ACCELERATION,
@@ -176,7 +176,8 @@ def closures(I: Integers, W: Array, q: Array, residual: Array, J: Array, T: Arra
                 k += 1
             if I[at + TIES] == 0:
                 for side in range(2):
-                    R, p = frame_of(W, I[at + POSE1 + side], I[at + FRAMES] + SECOND_FRAME * side)
+                    pose, frame = I[at + POSE1 + side], I[at + FRAMES] + SECOND_FRAME * side
+                    R, p = axes_of(W, pose, frame), point_of(W, pose, frame)
                     for a in range(9):
                         frames[i, c, 12 * side + a] = R[a]
                     for a in range(3):
@@ -195,6 +196,7 @@ def drift(I: Integers, W: Array, q: Array, v: Array, out: Array) -> None:
         place(I, W)
         move(I, W)
         accelerate(I, W)
+        look(I, W)
         drifts(I, W)
         k = 0
         for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):

@@ -3,10 +3,8 @@
 A block is closures that determine some passive coordinates together, once the actuated coordinates and those of
 earlier blocks are known; the blocks in their order are a triangular system, so that a chain of loops on one crank costs
 by its length. A block A x = b with as many rows as columns is factorised by Gauss with the largest pivot of each column;
-a taller one, consistent because its mechanism moves at all, by Householder.
-
-Its factors stand from `FACTOR` on, row by row. Behind those of a tall block stand the first numbers of the reflections
-A = H_1 ... H_n R, H = 1 - w w^T; the others stand below the diagonal.
+a taller one, consistent because its mechanism moves at all, by Householder. Most blocks are of one column or of two: they
+have no loops.
 """
 
 from __future__ import annotations
@@ -15,6 +13,17 @@ from math import inf, sqrt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.compiled import compiled
+from fivebar_pin.engine.factors import (
+    gauss,
+    gauss_of_two,
+    householder,
+    invert,
+    lower,
+    reflect,
+    square,
+    upper,
+    upper_back,
+)  # fmt: skip
 from fivebar_pin.engine.tables import (
     BLOCK_SIZE,
     BLOCKS,
@@ -30,6 +39,7 @@ from fivebar_pin.engine.tables import (
     LEAD,
     LOCAL,
     MIX,
+    NORMS,
     NUMBER,
     PIVOTS,
     RAW,
@@ -59,9 +69,16 @@ def factorise(I: Integers, W: Array) -> bool:
     for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
         _gather(I, W, g)
         n, m, A = I[g + WIDTH], I[g + HEIGHT], I[g + FACTORS]
-        sign = _gauss(W, A, n, I[g + PIVOTS]) if m == n else _householder(W, A, m, n)
-        W[I[SIGNS] + I[g + NUMBER]] = sign
-        regular = regular and sign != 0.0
+        at = I[SIGNS] + I[g + NUMBER]
+        if m > n:
+            W[at] = householder(W, A, m, n)
+        elif n > 2:
+            W[at] = gauss(W, A, n, I[g + PIVOTS])
+        elif n == 2:
+            W[at] = gauss_of_two(W, A, I[g + PIVOTS])
+        else:
+            W[at] = invert(W, A)
+        regular = regular and W[at] != 0.0
     return regular
 
 
@@ -86,63 +103,10 @@ def _gather(I: Integers, W: Array, g: int) -> None:
 
 
 @compiled
-def _gauss(W: Array, A: int, n: int, pivots: int) -> float:
-    """Factorise A = P L U in place and return the sign of det A."""
-    sign = 1.0
-    for k in range(n):
-        p, most = k, abs(W[A + k * n + k])
-        for i in range(k + 1, n):
-            if abs(W[A + i * n + k]) > most:
-                p, most = i, abs(W[A + i * n + k])
-        W[pivots + k] = p
-        if not most > 0.0:
-            return 0.0
-        if p != k:
-            sign = -sign
-            for j in range(n):
-                W[A + k * n + j], W[A + p * n + j] = W[A + p * n + j], W[A + k * n + j]
-        if W[A + k * n + k] < 0.0:
-            sign = -sign
-        for i in range(k + 1, n):
-            if W[A + i * n + k] != 0.0:
-                factor = W[A + i * n + k] / W[A + k * n + k]
-                W[A + i * n + k] = factor
-                for j in range(k + 1, n):
-                    W[A + i * n + j] -= factor * W[A + k * n + j]
-    return sign
-
-
-@compiled
-def _householder(W: Array, A: int, m: int, n: int) -> float:
-    """Factorise A = Q R (m, n), m > n, in place and return 1, or 0 where a column depends on those before."""
-    for k in range(n):
-        size = 0.0
-        for i in range(k, m):
-            size += W[A + i * n + k] ** 2
-        size = sqrt(size)
-        if not size > 0.0:
-            return 0.0
-        head = W[A + k * n + k]
-        size = -size if head > 0.0 else size
-        unit = sqrt(size * (size - head))  # so that w w^T reflects the column onto size e_k
-        W[A + m * n + k] = first = (head - size) / unit
-        for i in range(k + 1, m):
-            W[A + i * n + k] /= unit
-        W[A + k * n + k] = size
-        for j in range(k + 1, n):
-            along = first * W[A + k * n + j]
-            for i in range(k + 1, m):
-                along += W[A + i * n + k] * W[A + i * n + j]
-            W[A + k * n + j] -= along * first
-            for i in range(k + 1, m):
-                W[A + i * n + j] -= along * W[A + i * n + k]
-    return 1.0
-
-
-@compiled
 def solve(I: Integers, W: Array) -> None:
     """Solve J x = lead for the passive part of x; its actuated part stands there already."""
     for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
+        raw_rhs = I[RHS] if I[g + MIX] < 0 else I[RAW_RHS]
         for i in range(I[g + RAW]):
             r = I[I[g + ROW_LIST] + i]
             k, value = I[r + JACOBIAN0], W[I[r + LEAD]]
@@ -150,7 +114,7 @@ def solve(I: Integers, W: Array) -> None:
                 if I[e + LOCAL] < 0:
                     value -= W[k] * W[I[X] + I[e + COLUMN]]
                 k += 1
-            W[I[RAW_RHS] + i] = value
+            W[raw_rhs + i] = value
         combine(I, W, g)
         substitute(I, W, g)
         for k in range(I[g + WIDTH]):
@@ -159,14 +123,12 @@ def solve(I: Integers, W: Array) -> None:
 
 @compiled
 def combine(I: Integers, W: Array, g: int) -> None:
-    """Combine the rows of a right side where those of its block are mixed; the raw ones stand behind, at RAW_RHS."""
+    """Combine the rows of a right side where those of its block are mixed: from RAW_RHS to RHS; else they stand there."""
     raw, mix = I[g + RAW], I[g + MIX]
-    for h in range(I[g + HEIGHT]):
-        k, total = mix + h * raw, W[I[RAW_RHS] + h]
-        if mix >= 0:
-            total = 0.0
-            for i in range(raw):
-                total += W[k + i] * W[I[RAW_RHS] + i]
+    for h in range(I[g + HEIGHT] if mix >= 0 else 0):
+        total = 0.0
+        for i in range(raw):
+            total += W[mix + h * raw + i] * W[I[RAW_RHS] + i]
         W[I[RHS] + h] = total
 
 
@@ -174,23 +136,27 @@ def combine(I: Integers, W: Array, g: int) -> None:
 def substitute(I: Integers, W: Array, g: int) -> None:
     """Solve A x = rhs of a factorised block in place; of a tall one x has the least residual, which stands behind it."""
     n, m, b, A, pivots = I[g + WIDTH], I[g + HEIGHT], I[RHS], I[g + FACTORS], I[g + PIVOTS]
-    if m == n:
-        for k in range(n):
-            p = int(W[pivots + k])
-            W[b + k], W[b + p] = W[b + p], W[b + k]
-        for i in range(1, n):
-            for k in range(i):
-                W[b + i] -= W[A + i * n + k] * W[b + k]
+    if m > n:
+        reflect(W, A, m, n, b)
+        upper(W, A, n, b)
+    elif n > 2:
+        lower(W, A, n, b, pivots)
+        upper(W, A, n, b)
+    elif n == 2:
+        first, second = W[b], W[b + 1]
+        if W[pivots] == 1.0:
+            first, second = second, first
+        second = (second - W[A + 2] * first) * W[A + 3]
+        W[b], W[b + 1] = (first - W[A + 1] * second) * W[A], second
     else:
-        _reflect(W, A, m, n, b)
-    _upper(W, A, n, b)
+        W[b] *= W[A]
 
 
 @compiled
 def substitute_back(I: Integers, W: Array, g: int) -> None:
     """Solve A^T x = rhs of a factorised square block in place; of a tall one R^T x = rhs."""
     n, b, A, pivots = I[g + WIDTH], I[RHS], I[g + FACTORS], I[g + PIVOTS]
-    _upper_back(W, A, n, b)
+    upper_back(W, A, n, b)
     if I[g + HEIGHT] == n:
         for i in range(n - 1, -1, -1):
             for k in range(i + 1, n):
@@ -201,39 +167,40 @@ def substitute_back(I: Integers, W: Array, g: int) -> None:
 
 
 @compiled
-def _reflect(W: Array, A: int, m: int, n: int, b: int) -> None:
-    """Return Q^T b in place."""
-    for k in range(n):
-        first = W[A + m * n + k]
-        along = first * W[b + k]
-        for i in range(k + 1, m):
-            along += W[A + i * n + k] * W[b + i]
-        W[b + k] -= along * first
-        for i in range(k + 1, m):
-            W[b + i] -= along * W[A + i * n + k]
-
-
-@compiled
-def _upper(W: Array, A: int, n: int, b: int) -> None:
-    """Solve U x = b in place, U the upper triangle of A."""
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            W[b + i] -= W[A + i * n + k] * W[b + k]
-        W[b + i] /= W[A + i * n + i]
-
-
-@compiled
-def _upper_back(W: Array, A: int, n: int, b: int) -> None:
-    """Solve U^T x = b in place."""
-    for i in range(n):
-        for k in range(i):
-            W[b + i] -= W[A + k * n + i] * W[b + k]
-        W[b + i] /= W[A + i * n + i]
-
-
-@compiled
 def inverse_norm(I: Integers, W: Array, g: int) -> float:
-    """Return the size of the (pseudo-)inverse of a factorised block, scaled: one over its smallest singular value.
+    """Write and return the size of the (pseudo-)inverse of a factorised block, scaled: 1 / its smallest singular value.
+
+    Of small square blocks it is the Frobenius norm, which is at least as large.
+    """
+    n, at = I[g + WIDTH], I[NORMS] + I[g + NUMBER]
+    if n > 2 or I[g + HEIGHT] > n:
+        W[at] = _norm_by_columns(I, W, g)
+    elif n == 2:
+        W[at] = _norm_of_two(I, W, g)
+    else:
+        W[at] = _norm_of_one(I, W, g)
+    return float(W[at])
+
+
+@compiled
+def _norm_of_one(I: Integers, W: Array, g: int) -> float:
+    """Return the size of the inverse of a block (1, 1)."""
+    return float(abs(W[I[g + FACTORS]]) / W[I[SCALE] + I[I[g + COLUMN_LIST]]])
+
+
+@compiled
+def _norm_of_two(I: Integers, W: Array, g: int) -> float:
+    """Return the size of the inverse of a block (2, 2), of U^-1 L^-1 = [[p (1 + u l q), -p u q], [-l q, q]]."""
+    k, columns = I[g + FACTORS], I[g + COLUMN_LIST]
+    p, u, low, q = W[k], W[k + 1], W[k + 2], W[k + 3]  # p, q are the inverses on the diagonal
+    row1, row2 = p / W[I[SCALE] + I[columns]], q / W[I[SCALE] + I[columns + 1]]
+    across, along = u * q, 1.0 + u * low * q
+    return sqrt(row1 * row1 * (along * along + across * across) + row2 * row2 * (1.0 + low * low))
+
+
+@compiled
+def _norm_by_columns(I: Integers, W: Array, g: int) -> float:
+    """Return the size of the inverse of a block of any size, see `inverse_norm`.
 
     Small square blocks: the Frobenius norm, which is at least as large. Others: inverse iteration on A^T A, which starts
     from the weakest direction of the sample before, in `WEAK`, and leaves that of this one there. It is stirred: what was
@@ -251,16 +218,16 @@ def inverse_norm(I: Integers, W: Array, g: int) -> float:
                 stir = _STIRRED * ((_GOLDEN * i) % 1.0 - 0.5) if k == 0 else 0.0
                 W[b + i] = (W[weak + i] + stir) / W[I[SCALE] + I[columns + i]]
             substitute_back(I, W, g)
-            size = sqrt(_square(W, b, n))
+            size = sqrt(square(W, b, n))
             for i in range(n):
                 W[b + i] /= size
         if I[g + HEIGHT] == n:
             substitute(I, W, g)
         else:
-            _upper(W, I[g + FACTORS], n, b)
+            upper(W, I[g + FACTORS], n, b)
         for i in range(n):
             W[b + i] /= W[I[SCALE] + I[columns + i]]
-        size = _square(W, b, n)
+        size = square(W, b, n)
         most = most + size if explicit else size
         for i in range(n):
             W[weak + i] = W[b + i] / sqrt(size) if size < inf else 1.0  # a singular block is not remembered
@@ -278,12 +245,3 @@ def least_pivot(I: Integers, W: Array) -> float:
             if not size >= least:
                 least = size if size > 0.0 else 0.0
     return least
-
-
-@compiled
-def _square(W: Array, b: int, n: int) -> float:
-    """Return the square of the length of a vector."""
-    total = 0.0
-    for i in range(b, b + n):
-        total += W[i] * W[i]
-    return total

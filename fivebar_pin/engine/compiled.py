@@ -20,13 +20,14 @@ __all__ = ["compiled", "entry"]
 F = TypeVar("F", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "nsz", "arcp"}}
+_WITHIN: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _HERE = Path(__file__).resolve().parent
 _CONFIG: Any = numba.config  # what the environment says, NUMBA_CACHE_DIR among it
 
 
 def compiled(function: F) -> F:
     """Compile a function that other compiled functions call."""
-    made: F = numba.njit(forceinline=True, **_OPTIONS)(function)
+    made: F = numba.njit(**_WITHIN, **_OPTIONS)(function)
     return made
 
 
@@ -34,7 +35,8 @@ def entry(function: F) -> F:
     """Compile a function that Python calls; its machine code is kept for the next process where a place is found."""
     place = kept_code((_HERE, Path(function.__code__.co_filename).resolve().parent))
     if place is None:
-        return compiled(function)
+        unkept: F = numba.njit(**_OPTIONS)(function)
+        return unkept
     with _caching_in(place):
         made: F = numba.njit(cache=True, **_OPTIONS)(function)
     return made

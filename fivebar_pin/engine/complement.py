@@ -25,6 +25,7 @@ from fivebar_pin.engine.tables import (
     JACOBIAN0,
     LEAD,
     LOCAL,
+    MIX,
     MOTOR_COUNT,
     MOTOR_LIST,
     MOTORS,
@@ -48,7 +49,7 @@ from fivebar_pin.engine.tables import (
     Integers,
     X,
 )  # fmt: skip
-from fivebar_pin.engine.tree import accelerate, move
+from fivebar_pin.engine.tree import drift, move
 
 __all__ = ["TOGETHER", "accelerations", "complement", "velocities"]
 
@@ -78,6 +79,7 @@ def complement(I: Integers, W: Array) -> None:
 @compiled
 def _right_side(I: Integers, W: Array, g: int, N: int) -> None:
     """Write what the rows of a block lack at unit speed of one motor, whose column of N begins at W[N]."""
+    raw_rhs = I[RHS] if I[g + MIX] < 0 else I[RAW_RHS]
     for i in range(I[g + RAW]):
         r = I[I[g + ROW_LIST] + i]
         k, value = I[r + JACOBIAN0], 0.0
@@ -85,7 +87,7 @@ def _right_side(I: Integers, W: Array, g: int, N: int) -> None:
             if I[e + LOCAL] < 0:
                 value -= W[k] * W[N + I[e + COLUMN] * I[NA]]
             k += 1
-        W[I[RAW_RHS] + i] = value
+        W[raw_rhs + i] = value
     combine(I, W, g)
 
 
@@ -109,9 +111,7 @@ def velocities(I: Integers, W: Array) -> None:
 @compiled
 def accelerations(I: Integers, W: Array) -> None:
     """Write the accelerations of all coordinates; those of the links are left as at no joint accelerations."""
-    for k in range(I[NV]):
-        W[I[A_HERE] + k] = 0.0
-    accelerate(I, W)
+    drift(I, W)
     drifts(I, W)
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
         W[I[r + LEAD]] = -W[I[r + LEAD]]

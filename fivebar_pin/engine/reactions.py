@@ -16,7 +16,7 @@ from fivebar_pin.engine.blocks import factorise, least_pivot, substitute_back
 from fivebar_pin.engine.bodies import joint_forces
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.entries import need, read, set_out
-from fivebar_pin.engine.rows import frame_of, jacobian, look
+from fivebar_pin.engine.rows import axes_of, jacobian, look, point_of
 from fivebar_pin.engine.tables import (
     A_HERE,
     BLOCK_SIZE,
@@ -220,8 +220,8 @@ def marks(
             put(places, 12 * b + ORIGIN, vector_at(W, I[bodies[b] + POSE] + ORIGIN))
         for x in range(nb, total):
             c = I[CLOSURES] + CLOSURE_SIZE * (x - nb)
-            R, _ = frame_of(W, I[c + POSE1], I[c + FRAMES])
-            _, p = frame_of(W, I[c + POSE2], I[c + FRAMES] + SECOND_FRAME)
+            R = axes_of(W, I[c + POSE1], I[c + FRAMES])
+            p = point_of(W, I[c + POSE2], I[c + FRAMES] + SECOND_FRAME)
             put_matrix(places, 12 * x, R)
             put(places, 12 * x + ORIGIN, p)
         for x in range(total):

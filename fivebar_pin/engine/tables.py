@@ -76,7 +76,7 @@ SPRING_SIZE = 8
 BETWEEN, AT_JOINT, AT_TURNING = range(3)
 
 # Numbers in W.
-ROTATION, ORIGIN, LEADING = 0, 9, 12  # of a pose, of a placement; LEADING: how far a screw or a slide goes in a unit
+ROTATION, ORIGIN, LEADING, ALIGNED = 0, 9, 12, 13  # of a pose, of a placement; see `Link.pitch`; 1: axes not turned
 MASS_CENTRE, MOMENTS = 1, 4  # of a mass; moments xx, xy, yy, xz, yz, zz about the centre
 ARMATURE, DAMPING, FRICTION = range(3)  # of losses
 SECOND_FRAME = 12  # of frames

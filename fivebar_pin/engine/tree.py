@@ -19,6 +19,7 @@ from fivebar_pin.engine.compiled import compiled
 from fivebar_pin.engine.tables import (
     A_HERE,
     ACCELERATION,
+    ALIGNED,
     ALPHA,
     AXIS,
     BALL,
@@ -74,7 +75,7 @@ from fivebar_pin.engine.vectors import (
     vector_at,
 )  # fmt: skip
 
-__all__ = ["accelerate", "coordinate", "integrate", "move", "own", "place", "power", "set_coordinate"]
+__all__ = ["accelerate", "coordinate", "drift", "integrate", "move", "own", "place", "set_coordinate"]
 
 _SMALL = 1e-4  # angle below which two terms of a series are exact to round-off [rad]
 
@@ -84,19 +85,22 @@ def place(I: Integers, W: Array) -> None:
     """Write the poses of all links at the configuration q."""
     for j in range(I[LINKS] + LINK_SIZE, I[LINKS_END], LINK_SIZE):
         k, fixed = I[j + Q], I[j + FIXED]
-        R_parent = matrix_at(W, I[j + PARENT_POSE] + ROTATION)
-        R = product(R_parent, matrix_at(W, fixed + ROTATION))
-        p = add(vector_at(W, I[j + PARENT_POSE] + ORIGIN), times(R_parent, vector_at(W, fixed + ORIGIN)))
+        R = matrix_at(W, I[j + PARENT_POSE] + ROTATION)
+        p = add(vector_at(W, I[j + PARENT_POSE] + ORIGIN), times(R, vector_at(W, fixed + ORIGIN)))
+        if W[fixed + ALIGNED] != 1.0:
+            R = product(R, matrix_at(W, fixed + ROTATION))
         kind = I[j + KIND]
         if kind == REVOLUTE:
-            R = turned_about_z(R, cos(W[k]), sin(W[k]))
+            c, s = cos(W[k]), sin(W[k])
+            R = turned_about_z(R, c, s)
         elif kind == TURNING:
             R = turned_about_z(R, W[k], W[k + 1])
         elif kind == SLIDE:
             p = add(p, times(R, (0.0, 0.0, W[fixed + LEADING] * W[k])))
         elif kind == SCREW:
             p = add(p, times(R, (0.0, 0.0, W[fixed + LEADING] * W[k])))
-            R = turned_about_z(R, cos(W[k]), sin(W[k]))
+            c, s = cos(W[k]), sin(W[k])
+            R = turned_about_z(R, c, s)
         elif kind == BALL:
             R = product(R, _of_quaternion(W, k))
         elif kind == PLANAR:
@@ -125,15 +129,32 @@ def move(I: Integers, W: Array) -> None:
 def accelerate(I: Integers, W: Array) -> None:
     """Write the accelerations of all links at the joint accelerations a; their velocities stand there already."""
     for j in range(I[LINKS] + LINK_SIZE, I[LINKS_END], LINK_SIZE):
-        parent, here = I[j + PARENT_RATE], I[j + RATE]
-        omega, alpha = vector_at(W, parent + OMEGA), vector_at(W, parent + ALPHA)
         turning, sliding = own(I, W, j, I[V_HERE])
         turning_rate, sliding_rate = own(I, W, j, I[A_HERE])
-        r = sub(vector_at(W, I[j + POSE] + ORIGIN), vector_at(W, I[j + PARENT_POSE] + ORIGIN))
-        put(W, here + ALPHA, add(add(alpha, cross(omega, turning)), turning_rate))
-        carried = add(cross(alpha, r), cross(omega, cross(omega, r)))
-        relative = add(cross(add(add(omega, omega), turning), sliding), sliding_rate)
-        put(W, here + ACCELERATION, add(vector_at(W, parent + ACCELERATION), add(carried, relative)))
+        _accelerate(I, W, j, turning, sliding, turning_rate, sliding_rate)
+
+
+@compiled
+def drift(I: Integers, W: Array) -> None:
+    """Write the accelerations of all links at no joint accelerations; their velocities stand there already."""
+    zero = (0.0, 0.0, 0.0)
+    for j in range(I[LINKS] + LINK_SIZE, I[LINKS_END], LINK_SIZE):
+        turning, sliding = own(I, W, j, I[V_HERE])
+        _accelerate(I, W, j, turning, sliding, zero, zero)
+
+
+@compiled
+def _accelerate(
+    I: Integers, W: Array, j: int, turning: Vector, sliding: Vector, turning_rate: Vector, sliding_rate: Vector
+) -> None:
+    """Write the accelerations of a link from those of its parent and from the rates of its joint."""
+    parent, here = I[j + PARENT_RATE], I[j + RATE]
+    omega, alpha = vector_at(W, parent + OMEGA), vector_at(W, parent + ALPHA)
+    r = sub(vector_at(W, I[j + POSE] + ORIGIN), vector_at(W, I[j + PARENT_POSE] + ORIGIN))
+    put(W, here + ALPHA, add(add(alpha, cross(omega, turning)), turning_rate))
+    carried = add(cross(alpha, r), cross(omega, cross(omega, r)))
+    relative = add(cross(add(add(omega, omega), turning), sliding), sliding_rate)
+    put(W, here + ACCELERATION, add(vector_at(W, parent + ACCELERATION), add(carried, relative)))
 
 
 @compiled
@@ -149,15 +170,6 @@ def own(I: Integers, W: Array, j: int, rates: int) -> tuple[Vector, Vector]:
             sliding = add(sliding, scaled(W[I[c + PITCH]], axis))
         c += COLUMN_SIZE
     return turning, sliding
-
-
-@compiled
-def power(W: Array, motion: int, axis: int, centre: int, pitch: int, f: Vector, m: Vector, point: Vector) -> float:
-    """Return the power, at unit velocity of a column, of a force f at a point and a moment m on what it moves."""
-    e = axis_at(W, axis)
-    turning = dot(e, add(m, cross(sub(point, vector_at(W, centre)), f)))
-    sliding = W[pitch] * dot(e, f)
-    return turning if motion == TURN else sliding if motion == SHIFT else turning + sliding
 
 
 @compiled

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, frozen
-from fivebar_pin.engine.tables import Q_HERE, STATUS
+from fivebar_pin.engine.tables import NQ, Q_HERE, STATUS, Integers
 from fivebar_pin.engine.threads import each
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.mechanism.closing import closed_enough, search
@@ -22,7 +22,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
 from fivebar_pin.mechanism.prepared import Prepared
 
-__all__ = ["Followed", "follow", "open_by", "reach", "require_near", "singular"]
+__all__ = ["Followed", "blocked", "follow", "open_by", "reach", "require_near", "singular"]
 
 
 _CHUNK = 4096  # samples that are followed one after the other
@@ -184,9 +184,13 @@ def _one(loops: Loops, q: Array, other: Array) -> bool:
 
 
 def _blocked(loops: Loops, ready: Prepared, x: Array, done: int) -> Blocked:
-    """Say why there is no way on from where this thread's memory is: the motors, x out of reach, or a singularity."""
-    I, W = ready.I, ready.memory()
-    q = np.array(W[I[Q_HERE] : I[Q_HERE] + ready.nq][None])
+    """Say why there is no way on from where this thread's memory is."""
+    return blocked(loops, ready.I, ready.memory(), x if done else None)
+
+
+def blocked(loops: Loops, I: Integers, W: Array, x: Array | None) -> Blocked:
+    """Say why there is no way on from q in W to x (na,), or none at all: the motors, out of reach, or a singularity."""
+    q = np.array(W[I[Q_HERE] : I[Q_HERE] + I[NQ]][None])
     here = Configurations(loops, np.array(q))
     if W[I[STATUS]] == _TOGETHER:
         try:
@@ -194,7 +198,7 @@ def _blocked(loops: Loops, ready: Prepared, x: Array, done: int) -> Blocked:
         except InvalidInputError as error:
             return error
     sigma = float(here.passive.sigma[0])
-    if done:
+    if x is not None:
         loops.set_actuated(q, x)
         found = Configurations(loops, search(loops, q))
         if not closed_enough(loops, found.gap, _OUT_OF_REACH)[0]:

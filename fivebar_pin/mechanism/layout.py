@@ -264,7 +264,7 @@ class _Layout:
         losses = (model.armature, model.damping, model.upperDryFrictionLimit)
         self.head[e.LOSSES] = self._put(np.column_stack([np.array(x) for x in losses]))
         return {
-            "fixed": [self._put(np.zeros(13)), *(self._put_each(self._fixed(x)) for x in parts.links)],
+            "fixed": [self._put(np.zeros(14)), *(self._put_each(self._fixed(x)) for x in parts.links)],
             "mass": [-1, *(self._mass(j) for j in range(1, len(parts.links) + 1))],
             "frames": [self._put_each(self._frames(c)) for c in parts.anchored],
             "direction": [self._put(row) for c, rows in self._with_rows() for row in self._directions(c, rows)],
@@ -277,11 +277,12 @@ class _Layout:
         return zip(self.parts.anchored, self.parts.rows, strict=True)
 
     def _fixed(self, x: Link) -> Array:
-        """Return axes and origin on its parent, and pitch, of a link (n, 13)."""
+        """Return axes and origin on its parent, pitch, and whether the axes are the parent's, of a link (n, 14)."""
         R, p = x.R[None], x.p[None]
         if x.first:
             R, p = x.placed(self.axes[int(self.model.parents[x.joint])], self.dimensions.joints[x.joint])
-        return np.concatenate([R.reshape(-1, 9), p, np.full((len(p), 1), x.pitch)], axis=1)
+        same = np.all(R == np.eye(3), axis=(1, 2))[:, None]
+        return np.concatenate([R.reshape(-1, 9), p, np.full((len(p), 1), x.pitch), same], axis=1)
 
     def _mass(self, j: int) -> int:
         """Return the place of mass, mass centre and moments about it in the axes of a link, or -1 where it has none."""

@@ -15,7 +15,6 @@ from random_chains import random_chain, random_inertia, random_placement
 import fivebar_pin as fb
 from fivebar_pin import JointSpring, Spring
 from fivebar_pin.cli import main
-from fivebar_pin.cli._moving import sway
 from fivebar_pin.dynamics import inverse
 from fivebar_pin.dynamics.compiled_calls import CHUNK
 from fivebar_pin.dynamics.inverse import ROADS, roads_apart
@@ -118,7 +117,9 @@ def test_more_motors_than_mobility_share_the_load_on_both_roads():
 
 def path_of(samples: int) -> tuple[fb.ClosedChain, fb.Trajectory]:
     chain = five_bar(base=TILTED)
-    return chain, sway(chain, fb.diagnose(chain).q, samples=samples)
+    t = np.linspace(0.0, 1.0, samples)
+    swings = (fb.motion.harmonic(t, mean, 0.25, period=0.6, phase=k) for k, mean in enumerate((2.0, 1.0)))
+    return chain, fb.drive(chain, fb.motion.combine(*swings))
 
 
 def test_threads_change_no_bit_of_a_long_trajectory():

@@ -217,6 +217,13 @@ def test_nothing_is_left_of_another_drive(make):
             np.testing.assert_array_equal(getattr(again, name), getattr(clean, name))
 
 
+def test_the_last_steps_are_kept_for_the_next_prediction():
+    chain = five_bar()
+    d = Driven(chain, [[2.0, 1.0], [2.03, 1.04], [2.036, 1.048], [2.036, 1.06]], fb.assemble(chain, [2.0, 1.0]))
+    I = Sampled(chain).I
+    np.testing.assert_allclose(d.W[I[[e.LAST_STEP, e.SECOND_STEP]]], [0.012, 0.01], rtol=1e-12)
+
+
 def test_predictions_are_integrals_of_parabolas():
     """h (w_0 N(0) + w_1 N(-h_1) + w_2 N(-h_1 - h_2)) is the integral of N from 0 to h, as far as steps are even."""
     rng = np.random.default_rng(0)
@@ -321,8 +328,10 @@ def test_the_certificate_is_the_one_of_its_equations_and_bounds_what_it_says(fam
 def test_a_certificate_needs_every_block_contracting_from_either_end_and_no_sign_turned(family):
     """Each of its conditions broken by itself, and what is certified held against all of them."""
     accepted = refused = 0
-    for s, _ in steps_by(family, 24):
+    for s, _ in steps_by(family, 80 if family == "platform" else 24):
         blocks, nb = s.blocks, len(s.blocks)
+        for _ in range(20):  # until the norms of large blocks stay
+            calls.certify(s.I, s.W)
         certified, signs, before = calls.certify(s.I, s.W), s.numbers(e.SIGNS_BEFORE, nb), s.numbers(e.NORMS_BEFORE, nb)
         same, norms = np.array_equal(s.numbers(e.SIGNS, nb), signs), np.array(s.numbers(e.NORMS, nb))
 
@@ -335,7 +344,7 @@ def test_a_certificate_needs_every_block_contracting_from_either_end_and_no_sign
                 before[:] = old
                 assert calls.certify(s.I, s.W) == (same and bound <= 0.5)
                 accepted, refused = accepted + (bound <= 0.5), refused + (bound > 0.5)
-        if certified and worst(np.full(nb, 1e6)) > 0.5:
+        if certified and worst(norms) < 0.45 and worst(np.full(nb, 1e6)) > 0.5:
             for k in range(nb):
                 before[:] = 0.0
                 signs[k] *= -1.0

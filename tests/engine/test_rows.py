@@ -6,6 +6,7 @@ import calls
 import numpy as np
 import pinocchio as pin
 import pytest
+from equations import Equations
 from mechanisms import bennett, double_four_bar, five_bar, point, rscr, rssr, slider_crank, spherical_four_bar
 from mechanisms import welded_four_bar as welded
 from random_chains import random_chain, random_placement
@@ -55,18 +56,6 @@ def closed_everyhow(joint: object, base: pin.SE3) -> fb.ClosedChain:
     return fb.ClosedChain(model, closures, ())
 
 
-class Numpy:
-    """The closures of a chain by NumPy at one configuration, scaled."""
-
-    def __init__(self, chain: fb.ClosedChain, q: np.ndarray, v: np.ndarray) -> None:
-        loops = loops_of(chain)
-        poses = loops.tree.poses(q[None])
-        pairs = loops.pairs(poses)
-        self.residual = loops.row_scale * loops.residual(pairs)[0]
-        self.J = loops.row_scale[:, None] * loops.jacobian(poses, pairs)[0]
-        self.drift = loops.row_scale * loops.drift(pairs, loops.tree.rates(q[None], v[None], poses))[0]
-
-
 def looked(s: Sampled, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return residual, Jacobian and drift of all rows."""
     s.set(q, v, np.zeros(len(v)))
@@ -76,12 +65,12 @@ def looked(s: Sampled, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.nda
 
 @pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
 @everywhere
-def test_rows_of_every_closure_through_every_joint_equal_those_of_numpy(joint, base):
+def test_rows_of_every_closure_through_every_joint_equal_those_of_pinocchio(joint, base):
     """One by one; where joints slide only, two of the turned rows say all that three do."""
     chain = closed_everyhow(joint, base)
     s = Sampled(chain)
     for q, v, _ in states(chain.model, 3):
-        found, expected = looked(s, q, v), Numpy(chain, q, v)
+        found, expected = looked(s, q, v), Equations(chain, q, v)
         if len(s.rows) == len(expected.residual):
             close_to(found[0], expected.residual)
             close_to(found[1], expected.J)
@@ -91,15 +80,15 @@ def test_rows_of_every_closure_through_every_joint_equal_those_of_numpy(joint, b
 
 
 @pytest.mark.parametrize("make", CLOSED.values(), ids=CLOSED.keys())
-def test_what_rows_say_together_equals_what_those_of_numpy_say(make):
+def test_what_rows_say_together_is_what_all_rows_say(make):
     """The gradient J^T c, J^T J and J^T J': the same however rows are combined, open or closed."""
     chain = make()
     s = Sampled(chain)
     for q, v, _ in states(chain.model, 5):
-        say_the_same(looked(s, q, v), Numpy(chain, q, v))
+        say_the_same(looked(s, q, v), Equations(chain, q, v))
 
 
-def say_the_same(found: tuple[np.ndarray, np.ndarray, np.ndarray], expected: Numpy) -> None:
+def say_the_same(found: tuple[np.ndarray, np.ndarray, np.ndarray], expected: Equations) -> None:
     residual, J, drift = found
     close_to(J.T @ J, expected.J.T @ expected.J)
     close_to(J.T @ residual, expected.J.T @ expected.residual)

@@ -16,6 +16,7 @@ from fivebar_pin.engine.tables import (
     GOING,
     J_BEFORE,
     J_HERE,
+    MEMORY,
     MOTORS,
     MOVED,
     NA,
@@ -88,7 +89,10 @@ def advance(I, W, first):
 def mass_matrix(I, W, M):
     """Write the reduced inertia M (na, na) of the poses and the complement that stand there."""
     twists(I, W)
-    reduced_inertia(I, W, M)
+    reduced_inertia(I, W, I[MEMORY])
+    for a in range(I[NA]):
+        for b in range(I[NA]):
+            M[a, b] = W[I[MEMORY] + a * I[NA] + b]
 
 
 @entry
