@@ -438,3 +438,31 @@ def test_numbers_beyond_what_can_be_computed_are_refused():
     with pytest.raises(InvalidInputError, match=r"mean_square_power of design 0 = .* is beyond what can be computed"):
         pi = 1e160 * five_bar().inertial_parameters[None]
         fb.sweep(five_bar(), motion_of(five_bar()), inertias=pi, of="mean_square_power")
+
+
+def test_a_plate_whose_sides_cross_is_no_body():
+    made = Linkage("plated")
+    made.points({"A": (0, 0), "B": (0.4, 0), "C": (0.05, 0.087), "D": (0.33, 0.29), "E": (0.36, 0.4), "F": (0.1, 0.3)})
+    made.ground("A", "B")
+    made.bar("crank", "A", "C")
+    made.plate("coupler", "C", "D", "E", "F")
+    made.bar("rocker", "B", "D")
+    made.motor("crank", at="A")
+    chain = made.chain()
+    across = chain.parameters["coupler_E_y"]
+    found = fb.sweep(chain, motion_of(chain), parameters={"coupler_E_y": [across, -across]}, of="peak_torque")
+    assert found.status.tolist() == [Status.OK, Status.UNREAL]
+    with pytest.raises(InvalidInputError, match="sides that cross"):
+        chain.with_parameters(coupler_E_y=-across)
+
+
+def test_a_fixed_joint_moves_with_its_link():
+    """As read from a file, where a point is a link on a fixed joint: a closure may be at either."""
+    chain = five_bar()
+    model, old = chain.model.copy(), next(f for f in chain.model.frames if f.name == "left_rod_P")
+    fixed = model.addFrame(pin.Frame("fixed", old.parentJoint, 0, old.placement, pin.FrameType.FIXED_JOINT), False)
+    model.frames[model.getFrameId("left_rod_P")].parentFrame = fixed
+    other = replace(chain, model=model, closures=(fb.Closure(("fixed", "right_rod_P"), name="P"),))
+    values = {"left_rod": [0.2, 0.22]}
+    one, two = (fb.sweep(c, motion_of(chain), parameters=values, of="torque", near=home(chain)) for c in (chain, other))
+    assert one.ok.all() and np.array_equal(one["torque"], two["torque"])
