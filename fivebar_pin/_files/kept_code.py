@@ -14,8 +14,9 @@ __all__ = ["kept_code"]
 def kept_code(folders: Iterable[Path]) -> Path | None:
     """Return a folder for the machine code of sources in some folders, None where nothing can be written.
 
-    It is another one for each state of the sources: Numba looks at the file of the function it is asked for, not at those
-    of the functions that this one calls. It lies where NUMBA_CACHE_DIR says, beside the sources, or in the user's cache.
+    It is another one for each state of the sources: Numba looks at the file of the function it is asked for, not at
+    those of the functions that this one calls. It lies where NUMBA_CACHE_DIR says, beside the sources, or in the
+    user's cache.
     """
     first, *others = (Path(folder).resolve() for folder in folders)
     sources = hashlib.sha256()

@@ -69,7 +69,7 @@ class Anchored(ABC):
     columns: npt.NDArray[np.intp]
 
     def place(self, pair: FramePair) -> tuple[Array, Array]:
-        """Return the point (n, 3) and the axes (n, 3, 3) that its wrench is told at and in: of frame 2, and of frame 1."""
+        """Return the point (n, 3), of frame 2, and the axes (n, 3, 3), of frame 1, its wrench is told at and in."""
         return pair.p2, pair.R1
 
     @abstractmethod

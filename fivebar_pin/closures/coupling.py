@@ -134,7 +134,7 @@ class Coupling(Closure, word="coupling"):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Coupled(Anchored):
-    """A coupling with its coordinates found: ratios in the order of the columns. Bodies feel no force but in the joints."""
+    """A coupling with its coordinates found: ratios in the order of the columns. It acts in the joints alone."""
 
     closure: Coupling
     ratios: Array

@@ -1,7 +1,7 @@
 """Tree and closures over batches, in Pinocchio's terms: for those who look at many configurations at once.
 
-Spatial quantities are linear before angular, in world axes at the world origin: with the velocity v and acceleration a of
-the origin p of a link that turns with ω, α,
+Spatial quantities are linear before angular, in world axes at the world origin: with the velocity v and acceleration
+a of the origin p of a link that turns with ω, α,
 
     V = (v - ω × p, ω),        A = (a - α × p - ω × v, α)
 """
@@ -159,8 +159,8 @@ def closures(I: Integers, W: Array, q: Array, residual: Array, J: Array, T: Arra
         place(I, W)
         look(I, W)
         jacobian(I, W)
-        k, c = 0, 0
-        for at in range(I[CLOSURES], I[CLOSURES_END], CLOSURE_SIZE):
+        k = 0
+        for c, at in enumerate(range(I[CLOSURES], I[CLOSURES_END], CLOSURE_SIZE)):
             for r in range(I[at + ROW0], I[at + ROW0_END], ROW_SIZE):
                 unit = 1.0 / W[I[r + DIRECTION] + UNIT]
                 residual[i, k] = unit * W[I[r + RESIDUAL]]
@@ -182,7 +182,6 @@ def closures(I: Integers, W: Array, q: Array, residual: Array, J: Array, T: Arra
                         frames[i, c, 12 * side + a] = R[a]
                     for a in range(3):
                         frames[i, c, 12 * side + 9 + a] = p[a]
-            c += 1
 
 
 @entry
@@ -198,7 +197,5 @@ def drift(I: Integers, W: Array, q: Array, v: Array, out: Array) -> None:
         accelerate(I, W)
         look(I, W)
         drifts(I, W)
-        k = 0
-        for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
+        for k, r in enumerate(range(I[ROWS], I[ROWS_END], ROW_SIZE)):
             out[i, k] = W[I[r + LEAD]] / W[I[r + DIRECTION] + UNIT]
-            k += 1

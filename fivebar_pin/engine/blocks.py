@@ -1,10 +1,10 @@
 """Solving for the passive coordinates, block by block.
 
 A block is closures that determine some passive coordinates together, once the actuated coordinates and those of
-earlier blocks are known; the blocks in their order are a triangular system, so that a chain of loops on one crank costs
-by its length. A block A x = b with as many rows as columns is factorised by Gauss with the largest pivot of each column;
-a taller one, consistent because its mechanism moves at all, by Householder. Most blocks are of one column or of two: they
-have no loops.
+earlier blocks are known; the blocks in their order are a triangular system, so that a chain of loops on one crank
+costs by its length. A block A x = b with as many rows as columns is factorised by Gauss with the largest pivot of
+each column; a taller one, consistent because its mechanism moves at all, by Householder. Most blocks are of one
+column or of two: they have no loops.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def solve(I: Integers, W: Array) -> None:
 
 @compiled
 def combine(I: Integers, W: Array, g: int) -> None:
-    """Combine the rows of a right side where those of its block are mixed: from RAW_RHS to RHS; else they stand there."""
+    """Combine the rows of a right side where those of its block are mixed, from RAW_RHS to RHS."""
     raw, mix = I[g + RAW], I[g + MIX]
     for h in range(I[g + HEIGHT] if mix >= 0 else 0):
         total = 0.0
@@ -134,7 +134,7 @@ def combine(I: Integers, W: Array, g: int) -> None:
 
 @compiled
 def substitute(I: Integers, W: Array, g: int) -> None:
-    """Solve A x = rhs of a factorised block in place; of a tall one x has the least residual, which stands behind it."""
+    """Solve A x = rhs of a block in place; of a tall one x has the least residual, which stands behind it."""
     n, m, b, A, pivots = I[g + WIDTH], I[g + HEIGHT], I[RHS], I[g + FACTORS], I[g + PIVOTS]
     if m > n:
         reflect(W, A, m, n, b)
@@ -202,9 +202,9 @@ def _norm_of_two(I: Integers, W: Array, g: int) -> float:
 def _norm_by_columns(I: Integers, W: Array, g: int) -> float:
     """Return the size of the inverse of a block of any size, see `inverse_norm`.
 
-    Small square blocks: the Frobenius norm, which is at least as large. Others: inverse iteration on A^T A, which starts
-    from the weakest direction of the sample before, in `WEAK`, and leaves that of this one there. It is stirred: what was
-    weakest in a symmetric mechanism is often orthogonal to what will be.
+    Small square blocks: the Frobenius norm, which is at least as large. Others: inverse iteration on A^T A, which
+    starts from the weakest direction of the sample before, in `WEAK`, and leaves that of this one there. It is
+    stirred: what was weakest in a symmetric mechanism is often orthogonal to what will be.
     """
     n, b, weak, columns = I[g + WIDTH], I[RHS], I[g + WEAK], I[g + COLUMN_LIST]
     explicit = n <= _EXPLICIT and I[g + HEIGHT] == n

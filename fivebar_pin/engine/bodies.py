@@ -1,10 +1,11 @@
 """The equations of motion by the natural orthogonal complement, body by body [Angeles and Lee 1988, (44)-(46)].
 
-With t_i = T_i v_a the twist of body i at the origin of its link, and f_i, n_i the force and the moment about it that its
-motion needs,
+With t_i = T_i v_a the twist of body i at the origin of its link, and f_i, n_i the force and the moment about it that
+its motion needs,
 
     f = m (a_c - g),    n = I α + ω × I ω + c × f,    a_c = a + α × c + ω × (ω × c)
-    tau = sum_i T_i^T (n_i, f_i)  +  N^T (armature, losses, springs),      M_bar = sum_i T_i^T M_i T_i + N^T diag(armature) N
+    tau = sum_i T_i^T (n_i, f_i) + N^T (armature, losses, springs)
+    M_bar = sum_i T_i^T M_i T_i + N^T diag(armature) N
     F = -sum m a_c,    M_O = -sum (n + p × f)           shaking force and moment, weight left out
 """
 

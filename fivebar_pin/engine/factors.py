@@ -1,7 +1,8 @@
 """The factors of one block, in place, and triangular systems.
 
-They stand from W[A] on, row by row, those on the diagonal of an upper triangle as their inverses. Behind those of a tall
-matrix stand the first numbers of the reflections A = H_1 ... H_n R, H = 1 - w w^T; the others stand below the diagonal.
+They stand from W[A] on, row by row, those on the diagonal of an upper triangle as their inverses. Behind those of a
+tall matrix stand the first numbers of the reflections A = H_1 ... H_n R, H = 1 - w w^T; the others stand below the
+diagonal.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
 """Following an assembly mode along a motion, every step certified [Kantorovich 1948; Beltrán and Leykin 2013].
 
 From a closed configuration q_0 the actuated coordinates go along a straight line to where Newton's method, from a
-prediction, finds q_1. With δ = q_1 - q_0 and everything scaled, consider the chord q(s) = q_0 + s δ. Let D be the travel
-of all joints of a loop together and Λ the longest arm of one of them to the closure. Along the chord
+prediction, finds q_1. With δ = q_1 - q_0 and everything scaled, consider the chord q(s) = q_0 + s δ. Let D be the
+travel of all joints of a loop together and Λ the longest arm of one of them to the closure. Along the chord
 
     |c''| <= |(J_1 - J_0) δ| + Λ D^3,    |J_p''| <= sqrt(n) Λ D^2,    |J_p| changes by n Λ for a unit of passive travel
 
 with n passive columns, so that, β being the larger inverse of J_p at the two ends,
 
-    |c| <= |c''| / 8,    |J_p^-1| <= β_s = β / (1 - β (|J_p1 - J_p0| / 2 + |J_p''| / 8)),    η = β_s |c''| / 8,    K = n Λ
+    |c| <= |c''| / 8,    |J_p^-1| <= β_s = β / (1 - β (|J_p1 - J_p0| / 2 + |J_p''| / 8))
+    η = β_s |c''| / 8,    K = n Λ
 
 Where β_s K η <= 1/2, the theorem of Newton and Kantorovich gives for every s one closed configuration near q(s), and no
 other: together they are one branch from q_0 to q_1. Where it is more, the step is halved.
@@ -166,7 +167,7 @@ def _distance(I: Integers, W: Array) -> float:
 
 @compiled
 def _predict(I: Integers, W: Array, done: float, step: float, h: float) -> None:
-    """Move q to where it will be after a step of length h; where this is too far to say, the flag `CLOSED` is taken down.
+    """Move q to where it will be after a step of length h; too far to say, and the flag `CLOSED` is taken down.
 
     N is taken for a parabola in the way, through this point and the two before [Adams and Bashforth 1883]:
 

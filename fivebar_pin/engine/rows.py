@@ -7,9 +7,9 @@ frame 1 and n of frame 2 its rows are
     turned    b · log(R_1^T R_2) - x_0                 length   |P_2 - P_1| - x_0
     ratio     sum_k c_k q_k - offset
 
-The rate of a row is the power of a wrench, a force f at P_2 and a moment m, on the velocity of body 2 relative to body 1:
-its entries in the Jacobian are the powers of this wrench on what single coordinates move [Ball 1900], and its multiple by
-lambda is what the closure does to body 2. Rows are measured in lengths of the chain.
+The rate of a row is the power of a wrench, a force f at P_2 and a moment m, on the velocity of body 2 relative to
+body 1: its entries in the Jacobian are the powers of this wrench on what single coordinates move [Ball 1900], and its
+multiple by lambda is what the closure does to body 2. Rows are measured in lengths of the chain.
 """
 
 from __future__ import annotations

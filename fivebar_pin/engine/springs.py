@@ -111,7 +111,7 @@ def _act(W: Array, load: int, arm: Vector, f: Vector, m: Vector) -> None:
 
 @compiled
 def apply(I: Integers, W: Array, links: Integers, points: Array, wrenches: Array, sample: int, about: Vector) -> None:
-    """Take from what links need wrenches (n, k, 6) from outside at their points (k, 3), and add them up about a point."""
+    """Take from what links need wrenches (n, k, 6) from outside at their points (k, 3); add them up about a point."""
     for i in range(links.shape[0]):
         j = I[LINKS] + LINK_SIZE * links[i]
         arm = times(matrix_at(W, I[j + POSE] + ROTATION), (points[i, 0], points[i, 1], points[i, 2]))

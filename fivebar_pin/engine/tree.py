@@ -177,7 +177,7 @@ def integrate(I: Integers, W: Array, x: int) -> None:
     """Move q along the tangent that stands from W[x] on."""
     for j in range(I[LINKS] + LINK_SIZE, I[LINKS_END], LINK_SIZE):
         kind, k, i = I[j + KIND], I[j + Q], x + I[j + V]
-        if kind == REVOLUTE or kind == SLIDE or kind == SCREW:
+        if kind in (REVOLUTE, SLIDE, SCREW):
             W[k] += W[i]
         elif kind == TURNING:
             _turn(W, k, W[i])

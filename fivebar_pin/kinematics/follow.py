@@ -1,9 +1,10 @@
 """Following an assembly mode along a motion, sample after sample, every step certified: see `engine.following`.
 
 Long motions are cut into chunks of a fixed number of samples. Their first samples are reached first, along straight
-lines of the actuated coordinates; then every chunk is followed by itself, by several threads where there are some. Where
-a chunk does not lead to where the next one begins, because the motion went another way round a singularity than the
-straight line, that one is followed again from where it led to. What comes out does not depend on the number of threads.
+lines of the actuated coordinates; then every chunk is followed by itself, by several threads where there are some.
+Where a chunk does not lead to where the next one begins, because the motion went another way round a singularity than
+the straight line, that one is followed again from where it led to. What comes out does not depend on the number of
+threads.
 """
 
 from __future__ import annotations

@@ -345,7 +345,8 @@ class _Layout:
         head[e.JACOBIAN] = jacobian
         sizes = {
             e.Q_HERE: nq, e.V_HERE: nv, e.A_HERE: nv, e.X: nv, e.MOVED: nv, e.TARGET: na, e.JOINT: nv, e.TAU: na,
-            e.SHAKING: 6, e.CARRIED: 6, e.RHS: tall, e.RAW_RHS: tall, e.RESIDUALS: len(per_row), e.Q_BEFORE: nq, e.J_HERE: jacobian,
+            e.SHAKING: 6, e.CARRIED: 6, e.RHS: tall, e.RAW_RHS: tall, e.RESIDUALS: len(per_row), e.Q_BEFORE: nq,
+            e.J_HERE: jacobian,
             e.J_BEFORE: jacobian, e.SIGNS: nb, e.NORMS: nb, e.SIGNS_BEFORE: nb, e.NORMS_BEFORE: nb, e.REACH: 1,
             e.LAST_STEP: 1, e.SECOND_STEP: 1, e.CLOSED: 1, e.GOING: 1, e.STATUS: 1, e.TO: na, e.M_BAR: na * na,
             e.TO_V: na, e.TO_A: na,
@@ -406,7 +407,8 @@ class _Layout:
                     e.COLUMN0: columns + e.COLUMN_SIZE * x.v, e.PARENT_POSE: memory["pose"][x.parent],
                     e.POSE: memory["pose"][j], e.FIXED: constants["fixed"][j], e.PARENT_RATE: memory["rate"][x.parent],
                     e.RATE: memory["rate"][j], e.PARENT_LOAD: memory["load"][x.parent], e.LOAD: memory["load"][j],
-                    e.PARENT_TWIST: memory["twist"][x.parent], e.TWIST: memory["twist"][j], e.MASS: constants["mass"][j],
+                    e.PARENT_TWIST: memory["twist"][x.parent], e.TWIST: memory["twist"][j],
+                    e.MASS: constants["mass"][j],
                     e.REACHED: reached[j][0], e.REACHED_END: reached[j][1],
                 },
             )  # fmt: skip
@@ -445,7 +447,8 @@ class _Layout:
                 {
                     e.POSE1: memory["pose"][i], e.POSE2: memory["pose"][j], e.RATE1: memory["rate"][i],
                     e.RATE2: memory["rate"][j], e.FRAMES: constants["frames"][n], e.ROW0: start,
-                    e.ROW0_END: start + e.ROW_SIZE * count, e.ENTRY0: entries[n], e.ENTRY0_END: end, e.TIES: not between,
+                    e.ROW0_END: start + e.ROW_SIZE * count, e.ENTRY0: entries[n], e.ENTRY0_END: end,
+                    e.TIES: not between,
                 },
             )  # fmt: skip
             for row in range(count):

@@ -63,8 +63,8 @@ class Loops:
         reduce: constant row combinations that are independent in general, (r, m); all redundancy that holds at every
             configuration (the out-of-plane rows of a planar loop) is gone from them, and their unit is one.
         column_scale: unit of every velocity coordinate (nv,): 1 for angles, the chain's length for slides.
-        unit: what a residual is multiplied by to be one of lengths and angles (m,): 1 but for rows of coordinates, which
-            say the same whatever factor they are multiplied by.
+        unit: what a residual is multiplied by to be one of lengths and angles (m,): 1 but for rows of coordinates,
+            which say the same whatever factor they are multiplied by.
     """
 
     def __init__(self, chain: ClosedChain) -> None:

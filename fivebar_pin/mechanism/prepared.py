@@ -34,9 +34,10 @@ class Prepared:
         I: records of the chain, never written.
         W: its constants, and working memory as it is before the first sample; never written.
         nq: length of a configuration.
-        turns: which motors come back to the same pose after a whole turn, and which of these do not count turns (na,) each.
-        left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they are
-            [m, rad or -].
+        turns: which motors come back to the same pose after a whole turn, and which of these do not count turns (na,)
+            each.
+        left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they
+            are [m, rad or -].
         mixed: the rows of the engine as orthonormal combinations of those of the closures, both scaled (rows, m).
         vanishing: the other combinations, which say nothing anywhere, each of rows of one sort of one closure (k, m).
     """
@@ -104,7 +105,7 @@ def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
 
 
 def _mixes(loops: Loops, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return the combinations of the rows of each closure as combinations of all rows: those kept, those that vanish."""
+    """Return the combinations of the rows of each closure as ones of all rows: those kept, those that vanish."""
     found = []
     for some in zip(*parts, strict=True):
         spread = np.zeros((sum(len(x) for x in some), loops.m))
