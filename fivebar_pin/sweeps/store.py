@@ -28,7 +28,6 @@ class Store:
     def __init__(self, folder: str | os.PathLike[str], problem: Problem) -> None:
         self.folder, self._key, self._problem = as_path(folder), problem.key[:_DIGITS], problem
         check_folder(self.folder, overwrite=True)
-        self.folder.mkdir(parents=True, exist_ok=True)
 
     def path(self, k: slice) -> Path:
         """Return the file of a chunk."""
