@@ -10,7 +10,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin.balancing.conic import ConicForm, Cost
 from fivebar_pin.balancing.design import PROVED, Design
-from fivebar_pin.balancing.finishing import compact, exact, made
+from fivebar_pin.balancing.finishing import compact, finished, made
 from fivebar_pin.balancing.objectives.objective import Objective
 from fivebar_pin.balancing.solvers import SECOND, Block, Certificate, Outcome, Program, solve
 from fivebar_pin.balancing.solvers.cones import outside
@@ -205,8 +205,7 @@ def _finished(outcome: Outcome, task: _Task) -> tuple[Design | None, str]:
     felt = form.felt(list(question.weights), question.limits) > _FELT
     x = compact(form, outcome.x[: form.n], felt)
     for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
-        y, residual = exact(form, x, drop)
-        y = compact(form, y, felt)  # again: inertias about centres that have moved a hair
+        y, residual = finished(form, x, drop, felt)
         parameters, added, removed, lowest = made(form, y)
         if residual <= _EXACT and lowest >= -_PHYSICAL:
             break
