@@ -51,7 +51,7 @@ class Density(Immutable):
         return least - own if own < (1.0 - _DENSER) * least else 0.0
 
     def raised(self, mass: float, own: Array) -> Array:
-        """Return principal second moments (3,), ascending, the smallest raised to one level where the body is too dense.
+        """Return principal second moments (3,), ascending, the smallest raised to one level if the body is too dense.
 
         The level t of the k smallest has t^k s_{k+1} .. s_3 = (least m^(5/3))^3.
         """
