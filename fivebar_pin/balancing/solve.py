@@ -10,7 +10,7 @@ import numpy as np
 from fivebar_pin._arrays import Array, Immutable, frozen
 from fivebar_pin.balancing.conic import ConicForm, Cost
 from fivebar_pin.balancing.design import PROVED, Design
-from fivebar_pin.balancing.finishing import compact, exact, made
+from fivebar_pin.balancing.finishing import compact, finished, made
 from fivebar_pin.balancing.objectives.objective import Objective
 from fivebar_pin.balancing.solvers import SECOND, Block, Certificate, Outcome, Program, solve
 from fivebar_pin.balancing.solvers.cones import outside
@@ -96,7 +96,7 @@ def optimum(question: Question) -> Design:
     failure = SolverError("the problem was not solved")
     for task in tasks:
         try:
-            return _at_the_boundary(task)
+            return _or_nothing(_at_the_boundary(task), task)
         except SolverError as error:
             if _missing(error):
                 raise
@@ -171,20 +171,38 @@ def _at_the_boundary(task: _Task) -> Design:
     )
 
 
+def _or_nothing(design: Design, task: _Task) -> Design:
+    """Return the design without any material instead, where it is as good as far as the bound can tell.
+
+    Next to the apex of all cones a solver's material is made of its own errors: none meets everything exactly.
+    """
+    nothing = _nothing(task, design.dual_bound / task.cost.unit) if design.feasible else None
+    if nothing is None or nothing.objective - design.objective > max(design.gap, PROVED * task.size(design)):
+        return design
+    return task.graded(nothing)
+
+
 def _no_material(task: _Task) -> Design | None:
     """Return the design without any material, where it is one and a rough answer proves it all but optimal.
 
     Conditions can leave nothing else, at the apex of all cones, where no solver comes to an end.
     """
-    if max((outside(b.cone, b.g) for b in task.question.bounds), default=0.0) > _EXACT:
-        return None
     try:
         rough = solve(task.program, task.cost.P, task.cost.q, tolerance=_ROUGH, solver=task.solver)
     except SolverError:
         return None
-    design, _ = _finished(replace(rough, x=np.zeros(task.cost.P.size)), task)
+    design = _nothing(task, rough.bound)
     near = design is not None and design.gap <= _ROUGH * task.size(design)
     return task.graded(design) if design is not None and near else None
+
+
+def _nothing(task: _Task, bound: float) -> Design | None:
+    """Return the design without any material, where it is one, with a bound on its objective in the task's unit."""
+    if max((outside(b.cone, b.g) for b in task.question.bounds), default=0.0) > _EXACT:
+        return None
+    n = task.cost.P.size
+    zero = Outcome(np.zeros(n), np.zeros(0), float("nan"), float("nan"), bound, None)
+    return _finished(zero, task)[0]
 
 
 def _proof(task: _Task) -> Certificate | None:
@@ -205,8 +223,7 @@ def _finished(outcome: Outcome, task: _Task) -> tuple[Design | None, str]:
     felt = form.felt(list(question.weights), question.limits) > _FELT
     x = compact(form, outcome.x[: form.n], felt)
     for drop in (_NEGLIGIBLE, 0.0):  # without what only keeps a body strictly physical, if that can be
-        y, residual = exact(form, x, drop)
-        y = compact(form, y, felt)  # again: inertias about centres that have moved a hair
+        y, residual = finished(form, x, drop, felt)
         parameters, added, removed, lowest = made(form, y)
         if residual <= _EXACT and lowest >= -_PHYSICAL:
             break

@@ -26,6 +26,7 @@ from fivebar_pin.balancing import (
     realise,
 )
 from fivebar_pin.balancing.parameters import pseudo_inertia
+from fivebar_pin.balancing.pieces.materials import Density
 from fivebar_pin.dynamics import inverse_dynamics
 from fivebar_pin.errors import InfeasibleError, InvalidInputError, UnknownNameError
 
@@ -43,6 +44,13 @@ def crank_rocker() -> tuple[fb.ClosedChain, fb.Trajectory]:
     chain = fb.load(fb.io.shipped_path("four_bar_crank_rocker"))
     motion = fb.motion.cycloidal(np.linspace(0.0, 1.0, 101), 0.5, 0.5 + 2.0 * np.pi)
     return chain, fb.drive(chain, motion, near=next(iter(chain.references.values())))
+
+
+def shaken(chain: fb.ClosedChain, rng: np.random.Generator, size: float) -> fb.ClosedChain:
+    """The chain with the inertia of each body scaled at random, by a relative size."""
+    return chain.with_inertial_parameters(
+        chain.inertial_parameters * (1.0 + size * rng.standard_normal((len(chain.joints), 1)))
+    )
 
 
 def sampled(shape: str, size: tuple[float, ...], density: float, n: int = 400) -> tuple[float, float]:
@@ -382,6 +390,32 @@ def test_no_spatial_material_is_denser_than_stated(mode: str) -> None:
             assert np.cbrt(np.linalg.det(second)) >= k * c.mass ** (5.0 / 3.0) * (1.0 - 1e-5)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_no_round_off_makes_material_denser_than_stated(seed: int) -> None:
+    """A body so flat that its least second moment is the size of a solver's error on its cone."""
+    rng = np.random.default_rng(seed)
+    chain = shaken(mechanisms.rssr(), rng, 10.0 ** rng.uniform(-12.0, -9.0))
+    k = 0.2 * (3.0 / (4.0 * np.pi * 7850.0)) ** (2.0 / 3.0)
+    design = balance(chain, "force", mode="redesign", region=Ball(1.0))
+    assert design.status == "optimal" and np.abs(design.conditions.residual(design.chain)).max() < 1e-13
+    for c in design.added:
+        second = 0.5 * np.trace(c.inertia) * np.eye(3) - c.inertia
+        assert np.cbrt(np.linalg.det(second)) >= k * c.mass ** (5.0 / 3.0) * (1.0 - 1e-6)
+
+
+def test_bodies_too_dense_are_raised_by_the_least_that_makes_them_their_material() -> None:
+    """Second moments with all, two or one of them too small; those that suffice are left as they are."""
+    bound = Density(1.0)
+    for own, raised in (
+        ([-1e-9, 0.0, 0.0], [1.0, 1.0, 1.0]),
+        ([1e-3, 1e-2, 4.0], [0.5, 0.5, 4.0]),
+        ([-1e-9, 2.0, 4.0], [0.125, 2.0, 4.0]),
+        ([0.5, 1.0, 4.0], [0.5, 1.0, 4.0]),
+    ):
+        np.testing.assert_allclose(bound.raised(1.0, np.array(own)), raised, rtol=1e-14)
+    assert bound.lacking(2.0, 1.0) == 3.0 and bound.lacking(2.0, 5.0) == 0.0
+
+
 def test_bad_requests_are_refused_with_what_is_known() -> None:
     chain, _ = case_I()
     design = balance(chain, "force", region=Ball(0.1))
@@ -426,6 +460,15 @@ def test_where_conditions_leave_no_material_the_empty_mechanism_is_the_design() 
 
     case = balance_problems.draw(np.random.default_rng((21, 121)))
     design = balance_problem(case.chain, case.kind, **case.arguments).solve(case.minimise)
+    assert design.feasible and not design.parameters.any()
+    assert 0.0 <= design.gap <= 1e-3 * design.objective
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_round_off_leaves_traces_of_material_where_there_is_to_be_none(seed: int) -> None:
+    case, rng = balance_problems.draw(np.random.default_rng((21, 121))), np.random.default_rng(seed)
+    chain = shaken(case.chain, rng, 10.0 ** rng.uniform(-12.0, -9.0))
+    design = balance_problem(chain, case.kind, **case.arguments).solve(case.minimise)
     assert design.feasible and not design.parameters.any()
     assert 0.0 <= design.gap <= 1e-3 * design.objective
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fivebar_pin._arrays import Immutable, number
+from fivebar_pin._arrays import Array, Immutable, number
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 
 __all__ = [
@@ -30,6 +30,7 @@ MATERIALS: Mapping[str, float] = {
     "tungsten": 19250.0,
 }  # densities [kg/m3]
 DISC = 2.0 * np.pi  # m^2 / (d t I_c) of a solid disc [-]
+_DENSER = 1e-7  # share of the least inertia that may be missing: less is round-off of a body's moments [-]
 _RANGE = 1e12  # a bound on density is of use within this range of the mechanism's own inertia [-]
 _THICKNESS = 0.2  # of flat material unless given [chain lengths]
 
@@ -43,6 +44,26 @@ class Density(Immutable):
     """
 
     least: float
+
+    def lacking(self, mass: float, own: float) -> float:
+        """Return the inertia that a flat body of a mass and I_c = own lacks, zero if no more than round-off."""
+        least = self.least * mass**2
+        return least - own if own < (1.0 - _DENSER) * least else 0.0
+
+    def raised(self, mass: float, own: Array) -> Array:
+        """Return principal second moments (3,), ascending, the smallest raised to one level if the body is too dense.
+
+        The level t of the k smallest has t^k s_{k+1} .. s_3 = (least m^(5/3))^3.
+        """
+        least = (self.least * mass ** (5.0 / 3.0)) ** 3
+        if own[0] > 0.0 and np.cbrt(np.prod(own)) >= (1.0 - _DENSER) * np.cbrt(least):
+            return own
+        for k in (1, 2):
+            if own[k] > 0.0:
+                level = (least / float(np.prod(own[k:]))) ** (1.0 / k)
+                if level <= own[k]:
+                    return np.append(np.full(k, level), own[k:])
+        return np.full(3, np.cbrt(least))
 
 
 def density_of(material: str | float) -> float:

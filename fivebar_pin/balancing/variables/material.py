@@ -211,6 +211,27 @@ class Material(Part):
             z[4], z[5] = h[0] ** 2 / m + 0.5 * own, h[0] * h[1] / m
         return z
 
+    def swollen(self, z: Array) -> Array:
+        """Return the piece with the least second moments about its mass centre that its density leaves.
+
+        What is taken from a body keeps its own: more could not be taken.
+        """
+        density, m = self.limits.density, float(z[0])
+        if density is None or self.limits.solid is not None or self.sign < 0 or m <= 0.0:
+            return z
+        z = np.array(z)
+        if self.planar:
+            lack = density.lacking(m, float(z[3] - z[1:3] @ z[1:3] / m))
+            z[3] += lack
+            if self.split:
+                z[4] += 0.5 * lack
+            return z
+        P = pseudo_inertia(z[:10])
+        values, V = np.linalg.eigh(P[:3, :3] - np.outer(z[1:4], z[1:4]) / m)
+        P[:3, :3] += (V * (density.raised(m, values) - values)) @ V.T
+        z[:10] = from_pseudo_inertia(P)
+        return z
+
     def make(self, setting: Setting, z: Array, parameters: Array) -> Made:
         """Return the bodies with it, made flat in the plane, at the height of the present body's centre of mass."""
         b, name = self.body, setting.chain.joints[self.body]

@@ -102,6 +102,10 @@ class Part(Immutable, ABC):
         """
         return z
 
+    def swollen(self, z: Array) -> Array:
+        """Return the variables (size,) with the inertia raised to the least that a stated density leaves."""
+        return z
+
     def make(self, setting: Setting, z: Array, parameters: Array) -> Made:
         """Return what values of the variables make of bodies that have parameters (nb, 10) without them."""
         return Made(parameters + (self.map(setting) @ z).reshape(-1, 10))
