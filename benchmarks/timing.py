@@ -13,8 +13,10 @@ SHORTEST = 2e-3
 def best_of(call: Callable[[], Any], *, repeats: int = 5, budget: float = 2.0) -> tuple[float, Any]:
     """Return the shortest time of a call [s] in several runs within a time budget [s], and the last result.
 
-    The first run is one call; it tells how often the others repeat a short one.
+    A call before the first run is not timed: it compiles what is not compiled yet. The first run is one call; it tells
+    how often the others repeat a short one.
     """
+    call()
     start = time.perf_counter()
     result = call()
     first = time.perf_counter() - start
