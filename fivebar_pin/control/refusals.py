@@ -10,7 +10,7 @@ from fivebar_pin.control.placed import Pushes
 from fivebar_pin.control.views import results
 from fivebar_pin.dynamics.elastic import spring_forces
 from fivebar_pin.engine import single
-from fivebar_pin.engine.tables import TARGET, TO, TO_V, Integers
+from fivebar_pin.engine.tables import FARTHEST, TARGET, TO, TO_V, Integers
 from fivebar_pin.errors import AssemblyError, FiveBarPinError, InvalidInputError, SingularityError, SolverError
 from fivebar_pin.kinematics.follow import blocked
 from fivebar_pin.mechanism.loops import loops_of
@@ -61,7 +61,7 @@ def _too_far(chain: ClosedChain, I: Integers, W: Array) -> InvalidInputError:
     return InvalidInputError(
         f"step of {chain.actuated[k]}",
         float(step[k]),
-        f"must be below {single.FARTHEST:g} rad, or lengths of the chain",
+        f"must be below {FARTHEST:g} rad, or lengths of the chain",
         "Go there in several calls, or jump.",
     )
 

@@ -139,7 +139,7 @@ def integrated(I: Integers, W: Array, q: Array, x: Array, out: Array) -> None:
         read(W, I[Q_HERE], q, i, I[NQ])
         read(W, I[X], x, i, I[NV])
         integrate(I, W, I[X])
-        write(W, I[Q_HERE], out, i, I[NQ])
+        write(W, I[Q_HERE], out, i, 0, I[NQ])
 
 
 @entry

@@ -29,6 +29,7 @@ from fivebar_pin.engine.tables import (
     X,
 )  # fmt: skip
 from fivebar_pin.engine.tree import integrate, place
+from fivebar_pin.engine.vectors import larger
 
 __all__ = ["close"]
 
@@ -64,9 +65,7 @@ def largest_residual(I: Integers, W: Array) -> float:
     """Return the largest residual, scaled; infinite where one is not a number."""
     most = 0.0
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
-        size = abs(W[I[r + RESIDUAL]])
-        if not size <= most:  # max() would pass over what is not a number
-            most = size if size < inf else inf
+        most = larger(most, abs(W[I[r + RESIDUAL]]))
     return most
 
 

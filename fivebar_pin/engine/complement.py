@@ -44,6 +44,7 @@ from fivebar_pin.engine.tables import (
     STATUS,
     TO_A,
     TO_V,
+    TOGETHER,
     V_HERE,
     WIDTH,
     Integers,
@@ -51,10 +52,7 @@ from fivebar_pin.engine.tables import (
 )  # fmt: skip
 from fivebar_pin.engine.tree import drift, move
 
-__all__ = ["TOGETHER", "accelerations", "complement", "velocities"]
-
-TOGETHER = 2
-"""Status: motors that closures tie to each other."""
+__all__ = ["accelerations", "complement", "velocities"]
 
 _TIED = 1e-7  # rate of closures at unit speed of a motor from which on they tie it to others [-]
 

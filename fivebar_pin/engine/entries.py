@@ -6,13 +6,14 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.engine.bodies import drag, inertia_forces, joint_forces, torques, twists, weigh
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.complement import accelerations, velocities
-from fivebar_pin.engine.following import FOLLOWED, advance
+from fivebar_pin.engine.following import advance
 from fivebar_pin.engine.rows import look
 from fivebar_pin.engine.springs import apply, pull
 from fivebar_pin.engine.tables import (
     A_HERE,
     CARRIED,
     DIRECTION,
+    FOLLOWED,
     JOINT,
     N_HERE,
     NA,
@@ -36,9 +37,9 @@ from fivebar_pin.engine.tables import (
     Integers,
 )  # fmt: skip
 from fivebar_pin.engine.tree import accelerate, move, place
-from fivebar_pin.engine.vectors import Vector
+from fivebar_pin.engine.vectors import Vector, larger
 
-__all__ = ["drive", "loads", "need", "open_by", "read", "residual", "set_out"]
+__all__ = ["drive", "loads", "need", "open_by", "read", "residual", "write", "write_matrix"]
 
 
 @entry
@@ -61,14 +62,10 @@ def drive(
         if W[I[STATUS]] == FOLLOWED:
             velocities(I, W)
             accelerations(I, W)
-            write(W, I[Q_HERE], q, done, I[NQ])
-            write(W, I[V_HERE], v, done, I[NV])
-            write(W, I[A_HERE], a, done, I[NV])
-            k = I[N_HERE]
-            for i in range(I[NV]):
-                for b in range(I[NA]):
-                    N[done, i, b] = W[k]
-                    k += 1
+            write(W, I[Q_HERE], q, done, 0, I[NQ])
+            write(W, I[V_HERE], v, done, 0, I[NV])
+            write(W, I[A_HERE], a, done, 0, I[NV])
+            write_matrix(W, I[N_HERE], N, done, I[NV], I[NA])
             gap[done] = open_by(I, W)
             done += 1
     return done
@@ -105,22 +102,19 @@ def loads(
         read(W, I[Q_HERE], q, i, I[NQ])
         read(W, I[V_HERE], v, i, I[NV])
         read(W, I[A_HERE], a, i, I[NV])
-        k = I[N_HERE]
-        for m in range(I[NV]):
-            for b in range(na):
-                W[k] = N[i, m, b]
-                k += 1
+        read_matrix(W, I[N_HERE], N, i, I[NV], na)
         place(I, W)
+        move(I, W)
         twists(I, W)
         lost = need(I, W, centre, links, points, wrenches, i)
         torques(I, W)
         joint_forces(I, W)
         for k in range(6):
             W[I[CARRIED] + k] += W[I[SHAKING] + k]
-        set_out(W, I[TAU], table, i, 0, na)
-        set_out(W, I[SHAKING], table, i, na, 6)
-        set_out(W, I[CARRIED], table, i, na + 6, 6)
-        set_out(W, I[JOINT], table, i, na + 12, I[NV])
+        write(W, I[TAU], table, i, 0, na)
+        write(W, I[SHAKING], table, i, na, 6)
+        write(W, I[CARRIED], table, i, na + 6, 6)
+        write(W, I[JOINT], table, i, na + 12, I[NV])
         i += 1
     return lost
 
@@ -129,8 +123,7 @@ def loads(
 def need(
     I: Integers, W: Array, about: Vector, links: Integers, points: Array, wrenches: Array, sample: int
 ) -> int:  # fmt: skip
-    """Write what every link and every joint need to move as they do, in poses that stand there; see `loads`."""
-    move(I, W)
+    """Write what every link and every joint need to accelerate as they do, moving as they are; see `loads`."""
     accelerate(I, W)
     inertia_forces(I, W, about)
     weigh(I, W, about)
@@ -141,19 +134,12 @@ def need(
 
 
 @compiled
-def set_out(W: Array, at: int, table: Array, i: int, column: int, count: int) -> None:
-    """Copy working memory into row i of a table, from a column on."""
-    for k in range(count):
-        table[i, column + k] = W[at + k]
-
-
-@compiled
 def open_by(I: Integers, W: Array) -> float:
-    """Return the largest residual, in the units of rows between frames [m or rad]."""
+    """Return the largest residual, in the units of rows between frames [m or rad]; infinite where one is no number."""
     most = 0.0
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
         unit = 1.0 if I[r + SORT] == RATIOS else W[I[r + DIRECTION] + UNIT]
-        most = max(most, abs(W[I[r + RESIDUAL]]) / unit)
+        most = larger(most, abs(W[I[r + RESIDUAL]]) / unit)
     return most
 
 
@@ -165,7 +151,23 @@ def read(W: Array, at: int, table: Array, i: int, count: int) -> None:
 
 
 @compiled
-def write(W: Array, at: int, table: Array, i: int, count: int) -> None:
-    """Copy working memory into row i of a table."""
+def write(W: Array, at: int, table: Array, i: int, column: int, count: int) -> None:
+    """Copy working memory into row i of a table, from a column on."""
     for k in range(count):
-        table[i, k] = W[at + k]
+        table[i, column + k] = W[at + k]
+
+
+@compiled
+def read_matrix(W: Array, at: int, tables: Array, i: int, rows: int, columns: int) -> None:
+    """Copy matrix i of some into working memory, row by row."""
+    for r in range(rows):
+        for c in range(columns):
+            W[at + r * columns + c] = tables[i, r, c]
+
+
+@compiled
+def write_matrix(W: Array, at: int, tables: Array, i: int, rows: int, columns: int) -> None:
+    """Copy working memory into matrix i of some."""
+    for r in range(rows):
+        for c in range(columns):
+            tables[i, r, c] = W[at + r * columns + c]

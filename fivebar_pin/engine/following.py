@@ -23,9 +23,10 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.engine.blocks import inverse_norm
 from fivebar_pin.engine.closing import close
 from fivebar_pin.engine.compiled import compiled
-from fivebar_pin.engine.complement import TOGETHER, complement
+from fivebar_pin.engine.complement import complement
 from fivebar_pin.engine.tables import (
     BLOCK_SIZE,
+    BLOCKED,
     BLOCKS,
     BLOCKS_END,
     CLOSED,
@@ -39,6 +40,7 @@ from fivebar_pin.engine.tables import (
     ENTRIES_END,
     ENTRY_CENTRE,
     ENTRY_SIZE,
+    FOLLOWED,
     J_BEFORE,
     J_HERE,
     JACOBIAN,
@@ -86,10 +88,7 @@ from fivebar_pin.engine.tables import (
 from fivebar_pin.engine.tree import integrate, set_coordinate
 from fivebar_pin.engine.vectors import dot, sub, vector_at
 
-__all__ = ["BLOCKED", "FOLLOWED", "TOGETHER", "advance"]
-
-FOLLOWED, BLOCKED = 0, 1
-"""Status: it ended where it should; a singularity, or nothing closed, on the way. See also `complement.TOGETHER`."""
+__all__ = ["advance", "copy_state"]
 
 LONGEST = 0.5  # longest step of a coordinate that is tried [rad, or chain lengths]
 _SHORTEST = 1e-9  # step of all motors together that is round-off: the way is blocked [rad, or chain lengths]
@@ -112,7 +111,7 @@ def advance(I: Integers, W: Array, first: bool) -> None:
     W[I[STATUS]] = FOLLOWED
     while done < 1.0 and W[I[STATUS]] == FOLLOWED:
         step = min(step, 1.0 - done)
-        _copy_state(I, W, I[Q_HERE], I[Q_BEFORE], I[J_HERE], I[J_BEFORE], I[SIGNS], I[SIGNS_BEFORE])
+        copy_state(I, W, I[Q_HERE], I[Q_BEFORE], I[J_HERE], I[J_BEFORE], I[SIGNS], I[SIGNS_BEFORE])
         W[I[CLOSED]] = 1.0
         if not first:
             _predict(I, W, done, step, step * total)
@@ -128,7 +127,7 @@ def advance(I: Integers, W: Array, first: bool) -> None:
             _settle(I, W)
             step *= 2.0
         else:
-            _copy_state(I, W, I[Q_BEFORE], I[Q_HERE], I[J_BEFORE], I[J_HERE], I[SIGNS_BEFORE], I[SIGNS])
+            copy_state(I, W, I[Q_BEFORE], I[Q_HERE], I[J_BEFORE], I[J_HERE], I[SIGNS_BEFORE], I[SIGNS])
             step *= 0.5
             if not step * total >= _SHORTEST:  # it is not, either, where a motor goes to what is no number
                 W[I[STATUS]] = BLOCKED
@@ -146,7 +145,7 @@ def _settle(I: Integers, W: Array) -> None:
 
 
 @compiled
-def _copy_state(I: Integers, W: Array, q: int, q_to: int, J: int, J_to: int, signs: int, signs_to: int) -> None:
+def copy_state(I: Integers, W: Array, q: int, q_to: int, J: int, J_to: int, signs: int, signs_to: int) -> None:
     """Keep the point of the branch that a step starts from, or go back to it. Norms stand behind the signs."""
     for i in range(I[NQ]):
         W[q_to + i] = W[q + i]

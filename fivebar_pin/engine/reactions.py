@@ -15,7 +15,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.engine.blocks import factorise, least_pivot, substitute_back
 from fivebar_pin.engine.bodies import joint_forces
 from fivebar_pin.engine.compiled import compiled, entry
-from fivebar_pin.engine.entries import need, read, set_out
+from fivebar_pin.engine.entries import need, read, write
 from fivebar_pin.engine.rows import axes_of, jacobian, look, point_of
 from fivebar_pin.engine.tables import (
     A_HERE,
@@ -70,7 +70,7 @@ from fivebar_pin.engine.tables import (
     Integers,
     X,
 )  # fmt: skip
-from fivebar_pin.engine.tree import place
+from fivebar_pin.engine.tree import move, place
 from fivebar_pin.engine.vectors import (
     Vector,
     add,
@@ -123,10 +123,11 @@ def reactions(
         jacobian(I, W)
         regular = factorise(I, W)
         weakest[i] = least_pivot(I, W) if regular else 0.0
+        move(I, W)
         lost = need(I, W, _NOTHING, links, points, wrenches, i)
         joint_forces(I, W)
         for b in range(bodies.shape[0]):
-            set_out(W, I[bodies[b] + LOAD], carried, i, 6 * b, 6)
+            write(W, I[bodies[b] + LOAD], carried, i, 6 * b, 6)
         if weakest[i] > 0.0:
             _multipliers(I, W)
             for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
@@ -135,12 +136,12 @@ def reactions(
                 W[k] = 0.0
             for c in range(I[CLOSURES], I[CLOSURES_END], CLOSURE_SIZE):
                 _hold(I, W, c)
-                set_out(W, I[SHAKING], carried, i, 6 * (bodies.shape[0] + (c - I[CLOSURES]) // CLOSURE_SIZE), 6)
+                write(W, I[SHAKING], carried, i, 6 * (bodies.shape[0] + (c - I[CLOSURES]) // CLOSURE_SIZE), 6)
             joint_forces(I, W)
             for b in range(bodies.shape[0]):
                 for k in range(6):
                     carried[i, 6 * b + k] += W[I[bodies[b] + LOAD] + k]
-            set_out(W, I[JOINT], left, i, 0, I[NV])
+            write(W, I[JOINT], left, i, 0, I[NV])
         i += 1
     return lost
 

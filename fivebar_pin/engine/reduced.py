@@ -7,14 +7,12 @@ a_0 being the accelerations of all joints when the motors have none, and b what 
 
 from __future__ import annotations
 
-from math import inf
-
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.blocks import factorise, least_pivot
 from fivebar_pin.engine.bodies import reduced_inertia, torques, twists
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.complement import accelerations, complement, velocities
-from fivebar_pin.engine.entries import need, open_by, read, set_out
+from fivebar_pin.engine.entries import need, open_by, read, write, write_matrix
 from fivebar_pin.engine.rows import jacobian, look
 from fivebar_pin.engine.tables import (
     A_HERE,
@@ -40,6 +38,7 @@ from fivebar_pin.engine.tables import (
     Integers,
 )  # fmt: skip
 from fivebar_pin.engine.tree import move, place
+from fivebar_pin.engine.vectors import larger
 
 __all__ = ["DRIVEN", "GIVEN", "OPEN", "RATE", "STATES", "WEAKEST", "reduced"]
 
@@ -57,7 +56,7 @@ def reduced(
     """Write complement, reduced inertia, bias and the accelerations at rest of the motors.
 
     Args:
-        I, W: the chain, with square blocks, and working memory; behind it is room for a reduced inertia.
+        I, W: the chain, with square blocks, and working memory.
         q, v: states (n, nq), (n, nv).
         source: where the velocities come from, `GIVEN` or `DRIVEN`.
         links, points, wrenches: of forces from outside (k,), (k, 3), (n, k, 6).
@@ -90,18 +89,10 @@ def reduced(
             lost = need(I, W, (0.0, 0.0, 0.0), links, points, wrenches, i)
             torques(I, W)
             reduced_inertia(I, W, I[M_BAR])
-            set_out(W, I[TAU], bias, i, 0, I[NA])
-            set_out(W, I[A_HERE], rest, i, 0, I[NV])
-            k = I[M_BAR]
-            for b in range(I[NA]):
-                for a in range(I[NA]):
-                    M[i, b, a] = W[k]
-                    k += 1
-            k = I[N_HERE]
-            for m in range(I[NV]):
-                for a in range(I[NA]):
-                    N[i, m, a] = W[k]
-                    k += 1
+            write(W, I[TAU], bias, i, 0, I[NA])
+            write(W, I[A_HERE], rest, i, 0, I[NV])
+            write_matrix(W, I[M_BAR], M, i, I[NA], I[NA])
+            write_matrix(W, I[N_HERE], N, i, I[NV], I[NA])
         i += 1
     return lost
 
@@ -115,6 +106,5 @@ def _rate(I: Integers, W: Array) -> float:
         for e in range(I[r + ENTRIES], I[r + ENTRIES_END], ENTRY_SIZE):
             rate += W[k] * W[I[V_HERE] + I[e + COLUMN]]
             k += 1
-        if not abs(rate) <= most:  # max() would pass over what is not a number
-            most = abs(rate) if abs(rate) < inf else inf
+        most = larger(most, abs(rate))
     return most

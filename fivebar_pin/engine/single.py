@@ -19,13 +19,12 @@ from math import floor, inf, nan, pi, sqrt
 import numpy as np
 
 from fivebar_pin._arrays import Array, seal
-from fivebar_pin.engine.bodies import drag, inertia_forces, reduced_inertia, torques, twists, weigh
+from fivebar_pin.engine.bodies import inertia_forces, reduced_inertia, torques, twists
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.complement import accelerations, velocities
-from fivebar_pin.engine.entries import open_by
-from fivebar_pin.engine.following import FOLLOWED, advance
+from fivebar_pin.engine.entries import need, open_by
+from fivebar_pin.engine.following import advance
 from fivebar_pin.engine.rows import motion_of_point
-from fivebar_pin.engine.springs import apply, pull
 from fivebar_pin.engine.tables import (
     A_HERE,
     ALPHA,
@@ -33,6 +32,8 @@ from fivebar_pin.engine.tables import (
     COLUMN_SIZE,
     COLUMNS,
     CONSTANTS,
+    FARTHEST,
+    FOLLOWED,
     LINK_SIZE,
     LINKS,
     MEMORY,
@@ -81,10 +82,9 @@ __all__ = [
 STAND, MOVE, INVERSE, FORWARD = range(4)
 """Tasks: stand at q, at rest; move; what the motors need for it; how the mechanism moves by what they give."""
 NO_NUMBER, TOO_FAR, LOST, MASSLESS, BEYOND = range(3, 8)
-"""Status, after those of `following`: nan or infinity was given; a way that would take for ever; a spring whose force
+"""Status, after those of `tables`: nan or infinity was given; a way that would take for ever; a spring whose force
 has no direction; a motion that moves no mass; a result beyond what can be computed."""
 
-FARTHEST = 1e6  # way of a motor to one sample that is a mistake [rad, or chain lengths]
 _LEAST = 1e-13  # pivot of the inertia, of unit diagonal, below which some motion moves no mass [-]
 
 # Fields of the record of an evaluator: the point of moments, force and moment on the frame, the closure residual, bias,
@@ -137,13 +137,8 @@ def sample(I: Integers, W: Array, task: int, links: Integers, points: Array, wre
         for a in range(I[NA]):
             W[I[TO_A] + a] = W[I[s + GIVEN] + a]
         if loaded:
-            accelerate(I, W)
             twists(I, W)
-            inertia_forces(I, W, about)
-            weigh(I, W, about)
-            drag(I, W)
-            lost = pull(I, W)
-            apply(I, W, links, points, wrenches, 0, about)
+            lost = need(I, W, about, links, points, wrenches, 0)
             torques(I, W)
             if lost >= 0:
                 W[I[STATUS]] = LOST

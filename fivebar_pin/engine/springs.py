@@ -26,6 +26,7 @@ from fivebar_pin.engine.tables import (
     LOAD,
     LOAD_A,
     LOAD_B,
+    MEETING,
     MOMENT,
     ORIGIN,
     POINT_B,
@@ -41,7 +42,6 @@ from fivebar_pin.engine.tables import (
     SPRINGS,
     SPRINGS_END,
     STIFFNESS,
-    TOGETHER,
     V_HERE,
     Integers,
 )  # fmt: skip
@@ -89,7 +89,7 @@ def _between(I: Integers, W: Array, s: int, coil: int) -> bool:
     d = sub(add(vector_at(W, I[s + POSE_B] + ORIGIN), arm2), add(vector_at(W, I[s + POSE_A] + ORIGIN), arm1))
     size, rest, damper = length_of(d), W[coil + REST], W[coil + DAMPER]
     free = rest == 0.0 and damper == 0.0  # then the force is k d, without a direction to define
-    defined: bool = free or size >= W[coil + TOGETHER]
+    defined: bool = free or size >= W[coil + MEETING]
     if free:
         force = scaled(W[coil + STIFFNESS], d)
     else:

@@ -19,10 +19,11 @@ from fivebar_pin.engine.blocks import inverse_norm
 from fivebar_pin.engine.closing import close
 from fivebar_pin.engine.compiled import compiled, entry
 from fivebar_pin.engine.entries import read, write
-from fivebar_pin.engine.following import BLOCKED, FOLLOWED
+from fivebar_pin.engine.following import copy_state
 from fivebar_pin.engine.rows import jacobian, look
 from fivebar_pin.engine.tables import (
     BLOCK_SIZE,
+    BLOCKED,
     BLOCKS,
     BLOCKS_END,
     CLOSED,
@@ -30,9 +31,9 @@ from fivebar_pin.engine.tables import (
     ENTRIES,
     ENTRIES_END,
     ENTRY_SIZE,
+    FOLLOWED,
     J_BEFORE,
     J_HERE,
-    JACOBIAN,
     JACOBIAN0,
     LOCAL,
     MOTORS,
@@ -58,6 +59,7 @@ from fivebar_pin.engine.tables import (
     Integers,
 )  # fmt: skip
 from fivebar_pin.engine.tree import place
+from fivebar_pin.engine.vectors import larger
 
 __all__ = ["lead", "left_open"]
 
@@ -80,7 +82,9 @@ def lead(I: Integers, W: Array, before: Array, knots: Array, q: Array) -> None:
         done, step = 0.0, 1.0
         while done < 1.0 and W[I[STATUS]] == FOLLOWED:
             step = min(step, 1.0 - done)
-            _keep(I, W)
+            copy_state(I, W, I[Q_HERE], I[Q_BEFORE], I[J_HERE], I[J_BEFORE], I[SIGNS], I[SIGNS_BEFORE])
+            for k in range(I[NV]):
+                W[I[MOVED] + k] = 0.0
             _between(W, before, knots, knot, done + step)
             close(I, W)
             if W[I[CLOSED]] == 1.0:
@@ -89,11 +93,11 @@ def lead(I: Integers, W: Array, before: Array, knots: Array, q: Array) -> None:
             if W[I[CLOSED]] == 1.0:
                 done, step = done + step, 2.0 * step
             else:
-                _go_back(I, W)
+                copy_state(I, W, I[Q_BEFORE], I[Q_HERE], I[J_BEFORE], I[J_HERE], I[SIGNS_BEFORE], I[SIGNS])
                 step *= 0.5
                 if step < _SHORTEST:
                     W[I[STATUS]] = BLOCKED
-    write(W, I[Q_HERE], q, 0, I[NQ])
+    write(W, I[Q_HERE], q, 0, 0, I[NQ])
 
 
 @compiled
@@ -102,32 +106,6 @@ def _between(W: Array, before: Array, knots: Array, knot: int, s: float) -> None
     for i in range(knots.shape[1]):
         start = knots[knot - 1, i] if knot > 0 else before[0, i]
         W[i] = knots[knot, i] if s >= 1.0 else start + s * (knots[knot, i] - start)
-
-
-@compiled
-def _keep(I: Integers, W: Array) -> None:
-    """Keep the point that a step starts from."""
-    for i in range(I[NQ]):
-        W[I[Q_BEFORE] + i] = W[I[Q_HERE] + i]
-    for i in range(I[JACOBIAN]):
-        W[I[J_BEFORE] + i] = W[I[J_HERE] + i]
-    for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
-        k = I[g + NUMBER]
-        W[I[SIGNS_BEFORE] + k], W[I[NORMS_BEFORE] + k] = W[I[SIGNS] + k], W[I[NORMS] + k]
-    for k in range(I[NV]):
-        W[I[MOVED] + k] = 0.0
-
-
-@compiled
-def _go_back(I: Integers, W: Array) -> None:
-    """Go back to it."""
-    for i in range(I[NQ]):
-        W[I[Q_HERE] + i] = W[I[Q_BEFORE] + i]
-    for i in range(I[JACOBIAN]):
-        W[I[J_HERE] + i] = W[I[J_BEFORE] + i]
-    for g in range(I[BLOCKS], I[BLOCKS_END], BLOCK_SIZE):
-        k = I[g + NUMBER]
-        W[I[SIGNS] + k], W[I[NORMS] + k] = W[I[SIGNS_BEFORE] + k], W[I[NORMS_BEFORE] + k]
 
 
 @compiled
@@ -181,13 +159,11 @@ def left_open(I: Integers, W: Array, q: Array, N: Array, sample: int) -> float:
     jacobian(I, W)
     most = 0.0
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
-        size = abs(W[I[r + RESIDUAL]])
-        most = most if size <= most else size
+        most = larger(most, abs(W[I[r + RESIDUAL]]))
         for a in range(I[NA]):
             rate, k = 0.0, I[r + JACOBIAN0]
             for e in range(I[r + ENTRIES], I[r + ENTRIES_END], ENTRY_SIZE):
                 rate += W[k] * N[sample, I[e + COLUMN], a]
                 k += 1
-            size = abs(rate) * W[I[SCALE] + I[I[MOTORS] + a]]
-            most = most if size <= most else size
+            most = larger(most, abs(rate) * W[I[SCALE] + I[I[MOTORS] + a]])
     return most

@@ -82,10 +82,16 @@ MASS_CENTRE, MOMENTS = 1, 4  # of a mass; moments xx, xy, yy, xz, yz, zz about t
 ARMATURE, DAMPING, FRICTION = range(3)  # of losses
 SECOND_FRAME = 12  # of frames
 OTHER, OFFSET, UNIT = 3, 6, 7  # of a direction: vector of frame 1, of frame 2, x_0, the unit of the row
-POINT_B, STIFFNESS, REST, DAMPER, TOGETHER = 3, 6, 7, 8, 9  # of a coil
+POINT_B, STIFFNESS, REST, DAMPER, MEETING = 3, 6, 7, 8, 9  # of a coil; MEETING: distance of ends that are one point
 OMEGA, VELOCITY, ALPHA, ACCELERATION = 0, 3, 6, 9  # of a rate: of the origin of the link, world axes
 FORCE, MOMENT, POINT = 0, 3, 6  # of a load, about the origin of the link, and of the wrench of a row, at a point
 ANGULAR, LINEAR = 0, 3  # of a twist
+
+
+# How following a motion ended, in `STATUS`: where it should; before a singularity, or where nothing closes; at motors
+# that closures tie to each other.
+FOLLOWED, BLOCKED, TOGETHER = range(3)
+FARTHEST = 1e6  # way of a motor from one sample to the next that is a mistake [rad, or chain lengths]
 
 
 def unwritten(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

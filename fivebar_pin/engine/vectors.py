@@ -5,7 +5,7 @@ Tuples of numbers stay in registers; slices of arrays would be counted as refere
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -21,6 +21,7 @@ __all__ = [
     "back",
     "cross",
     "dot",
+    "larger",
     "length_of",
     "matrix_at",
     "product",
@@ -39,6 +40,14 @@ Matrix: TypeAlias = tuple[float, float, float, float, float, float, float, float
 
 
 _1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(k) for k in range(1, 9))  # places without a sign need no check for it
+
+
+@compiled
+def larger(most: float, size: float) -> float:
+    """Return the larger one, infinite where the second is not a number: max() would pass over it."""
+    if size <= most:
+        return most
+    return size if size < inf else inf
 
 
 @compiled

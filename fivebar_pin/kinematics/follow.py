@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, frozen
-from fivebar_pin.engine.tables import NQ, Q_HERE, STATUS, Integers
+from fivebar_pin.engine.tables import FARTHEST, NQ, Q_HERE, STATUS, TOGETHER, Integers
 from fivebar_pin.engine.threads import each
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.mechanism.closing import closed_enough, search
@@ -28,9 +28,7 @@ __all__ = ["Followed", "blocked", "follow", "open_by", "reach", "require_near", 
 
 _CHUNK = 4096  # samples that are followed one after the other
 _SAME = 1e-9  # distance of closed configurations up to which they are one [rad, or chain lengths]
-_FAR = 1e6  # step of a coordinate from one sample to the next that is a mistake [rad, or chain lengths]
 _OUT_OF_REACH = 1e-8  # closure residual that a search leaves where nothing closes, at least [m or rad]
-_TOGETHER = 2  # see `engine.complement`
 
 Blocked = AssemblyError | SingularityError | InvalidInputError
 
@@ -166,12 +164,12 @@ def require_near(loops: Loops, X: Array) -> None:
     if len(X) < 2 or not X.shape[1]:
         return
     step = np.abs(X[1:] - X[:-1]) / loops.column_scale[loops.actuated]
-    if step.max() > _FAR:
+    if step.max() > FARTHEST:
         k, a = (int(i) for i in np.argwhere(step == step.max())[0])
         raise InvalidInputError(
             f"step of motor {a} to sample {k + 1}",
             float(X[k + 1, a] - X[k, a]),
-            f"must be below {_FAR:g} rad, or lengths of the chain",
+            f"must be below {FARTHEST:g} rad, or lengths of the chain",
             "Take more samples.",
         )
 
@@ -193,7 +191,7 @@ def blocked(loops: Loops, I: Integers, W: Array, x: Array | None) -> Blocked:
     """Say why there is no way on from q in W to x (na,), or none at all: the motors, out of reach, or a singularity."""
     q = np.array(W[I[Q_HERE] : I[Q_HERE] + I[NQ]][None])
     here = Configurations(loops, np.array(q))
-    if W[I[STATUS]] == _TOGETHER:
+    if W[I[STATUS]] == TOGETHER:
         try:
             complement_of(here)
         except InvalidInputError as error:

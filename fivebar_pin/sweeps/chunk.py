@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, frozen, seal
 from fivebar_pin.dynamics.compiled_calls import told_by_closures
-from fivebar_pin.engine.tables import NA, NV, STATUS
+from fivebar_pin.engine.tables import FOLLOWED, NA, NV, STATUS, unwritten
 from fivebar_pin.sweeps.problem import Problem
 from fivebar_pin.sweeps.result import Status
 from fivebar_pin.sweeps.terms import widths
@@ -61,7 +61,7 @@ class _Bench:
         self.q_a, self.v_a, self.a_a = frozen(motion.q), frozen(motion.v), frozen(motion.a)
         self.nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((1, 0, 6))
         seal(self.nothing)
-        self.path = tuple(_seen(x) for x in (self.q, self.v, self.a, self.N))
+        self.path = tuple(unwritten(x) for x in (self.q, self.v, self.a, self.N))
         self.moved: tuple[Status, int] | None = None
 
     def run(self, knots: Array) -> tuple[Status, int]:
@@ -83,7 +83,7 @@ class _Bench:
         W[:] = self.tables.W  # nothing of the design before is left
         self.q0[0] = self.problem.q0
         lead(I, W, self.tables.before, knots, self.q0)
-        if W[I[STATUS]] != 0.0:
+        if W[I[STATUS]] != FOLLOWED:
             return Status.OPEN, 0
         self.q[0] = self.q0[0]
         done = int(drive(I, W, self.q_a, self.v_a, self.a_a, self.q, self.v, self.a, self.N, self.gap))
@@ -130,10 +130,3 @@ class _Bench:
         }
         for name, values in series.items():
             values[i] = found[name]
-
-
-def _seen(array: Array) -> Array:
-    """Return the same memory, not to be written: the engine's code for such arrays is there already."""
-    view = array.view()
-    view.setflags(write=False)
-    return view

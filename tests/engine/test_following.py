@@ -13,7 +13,7 @@ from test_newton import every_mechanism
 
 import fivebar_pin as fb
 from fivebar_pin.engine import tables as e
-from fivebar_pin.engine.following import BLOCKED, FOLLOWED, TOGETHER
+from fivebar_pin.engine.tables import BLOCKED, FOLLOWED, TOGETHER
 from fivebar_pin.mechanism.complement import complement_of, rates_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from mechanisms import five_bar, four_bar
 from sampled import Driven
 
-from fivebar_pin.engine.following import BLOCKED, FOLLOWED
+from fivebar_pin.engine.tables import BLOCKED, FOLLOWED
 
 LENGTH = st.floats(0.2, 3.0)
 ANGLE = st.floats(-np.pi, np.pi)

@@ -30,8 +30,12 @@ import fivebar_pin as fb
 from fivebar_pin.closures import Coupling
 from fivebar_pin.engine import closing, entries
 from fivebar_pin.engine import tables as e
+from fivebar_pin.engine.sweeping import left_open
+from fivebar_pin.kinematics.follow import open_by
+from fivebar_pin.mechanism.complement import complement_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
+from fivebar_pin.mechanism.prepared import prepared_of
 
 SHIPPED = [name for name in fb.io.shipped() if "gram" not in name]
 
@@ -182,6 +186,25 @@ def test_the_residual_that_is_told_is_the_largest_and_never_passes_over_what_is_
             assert calls.largest(s.I, s.W) == np.inf
         s.W[s.of(r, e.RESIDUAL)] = -1e3 - k
         assert calls.largest(s.I, s.W) == 1e3 + k
+
+
+@every_mechanism
+def test_a_motion_that_is_no_number_never_counts_as_closed(make):
+    """Whichever row it opens: of two numbers, max() takes the first where the second is none."""
+    chain, q = make()
+    prepared, q = prepared_of(chain), q[None]
+    N = complement_of(Configurations(loops_of(chain), q))
+    assert open_by(prepared, q) < 1e-12
+    assert left_open(prepared.I, prepared.memory(), q, N, 0) < 1e-9
+    for k in range(chain.nq):
+        lost = np.array(q)
+        lost[0, k] = np.nan
+        assert open_by(prepared, lost) == np.inf
+        assert left_open(prepared.I, prepared.memory(), lost, N, 0) == np.inf
+    for k in range(chain.nv):
+        lost = np.array(N)
+        lost[0, k, 0] = np.nan
+        assert left_open(prepared.I, prepared.memory(), q, lost, 0) == np.inf
 
 
 def test_a_slide_of_a_large_chain_may_be_corrected_by_metres():

@@ -123,7 +123,7 @@ def attempt(I, W, tangent):
     Returns:
         Whether it closed, and whether that is certified to be the same branch.
     """
-    following._copy_state(I, W, I[Q_HERE], I[Q_BEFORE], I[J_HERE], I[J_BEFORE], I[SIGNS], I[SIGNS_BEFORE])
+    following.copy_state(I, W, I[Q_HERE], I[Q_BEFORE], I[J_HERE], I[J_BEFORE], I[SIGNS], I[SIGNS_BEFORE])
     W[I[CLOSED]] = 1.0
     for k in range(I[NV]):
         W[I[MOVED] + k] = tangent[k]
