@@ -11,7 +11,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.engine.tables import Integers
 from fivebar_pin.kinematics import FrameMotion
-from fivebar_pin.mechanism.links import links_of
+from fivebar_pin.mechanism.links import bodies_of, links_of
 
 __all__ = ["FrameRoom", "Pushes", "frame_room", "pushes_at"]
 
@@ -84,10 +84,6 @@ def _placed(chain: ClosedChain, name: str) -> tuple[int, Array, Array]:
     Raises:
         UnknownNameError: there is no such frame.
     """
-    model = chain.model
-    found = find_frame(model, name)
-    joint, link, axes = int(found.parentJoint), 0, np.eye(3)
-    for j, x in enumerate(links_of(model), start=1):
-        if x.joint == joint:
-            link, axes = j, x.axes  # the last one of a joint carries its body
+    found = find_frame(chain.model, name)
+    link, axes = bodies_of(links_of(chain.model))[int(found.parentJoint)]
     return link, axes.T @ np.array(found.placement.rotation), axes.T @ np.array(found.placement.translation)

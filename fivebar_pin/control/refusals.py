@@ -9,6 +9,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.control.placed import Pushes
 from fivebar_pin.control.views import results
 from fivebar_pin.dynamics.elastic import spring_forces
+from fivebar_pin.dynamics.equations import massless
 from fivebar_pin.engine import single
 from fivebar_pin.engine.tables import FARTHEST, TARGET, TO, TO_V, Integers
 from fivebar_pin.errors import AssemblyError, FiveBarPinError, InvalidInputError, SingularityError, SolverError
@@ -36,12 +37,7 @@ def refusal(
     if status == single.TOO_FAR:
         return _too_far(chain, I, W)
     if status == single.MASSLESS:
-        return InvalidInputError(
-            "inertia of the motion",
-            "singular",
-            "must be positive: some motion of the mechanism moves no mass",
-            "Give the bodies mass and inertia, or the joints an armature.",
-        )
+        return massless("inertia of the motion")
     return _blocked(chain, I, W, task)
 
 

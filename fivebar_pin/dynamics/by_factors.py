@@ -19,7 +19,7 @@ from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
 from fivebar_pin.dynamics.compiled_calls import in_pieces, outside, told_by_closures
 from fivebar_pin.engine.tables import BLOCK_SIZE, BLOCKS, BLOCKS_END, LINK_SIZE, LINKS, MIX, Integers, unwritten
-from fivebar_pin.mechanism.links import links_of
+from fivebar_pin.mechanism.links import bodies_of, links_of
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.prepared import prepared_of
@@ -58,15 +58,15 @@ def structure_of(chain: ClosedChain) -> Structure | None:
     known = [strain for strain in strains if strain is not None]
     if not told_by_closures(chain) or any(I[g + MIX] >= 0 for g in blocks) or len(known) < len(strains):
         return None
-    links = {x.joint: (j, x.axes) for j, x in enumerate(links_of(chain.model), start=1)}
+    carriers = bodies_of(links_of(chain.model))
     bodies, count = range(1, chain.model.njoints), len(loops.anchored)
     reach = np.zeros((len(bodies) + count, len(known)), dtype=np.int64)
     for k, (c, _, _) in enumerate(known):
         one, two = (_ancestors(chain, j) for j in loops.anchored[c].joints)
         reach[[j - 1 for j in one ^ two], k], reach[len(bodies) + c, k] = 1, 1
     return Structure(
-        np.array([I[LINKS] + LINK_SIZE * links[j][0] for j in bodies], dtype=np.int64),
-        np.array([links[j][1].T for j in bodies]).ravel(),
+        np.array([I[LINKS] + LINK_SIZE * carriers[j][0] for j in bodies], dtype=np.int64),
+        np.array([carriers[j][1].T for j in bodies]).ravel(),
         np.array([(c, moment) for c, moment, _ in known], dtype=np.int64).reshape(len(known), 2),
         np.array([direction for *_, direction in known]).reshape(len(known), 3),
         reach,

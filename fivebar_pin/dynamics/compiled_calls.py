@@ -11,7 +11,7 @@ from fivebar_pin.chain import ClosedChain, find_frame
 from fivebar_pin.dynamics.elastic import undirected
 from fivebar_pin.engine.tables import BLOCK_SIZE, BLOCKS, BLOCKS_END, HEIGHT, WIDTH, Integers
 from fivebar_pin.engine.threads import each, threads_of
-from fivebar_pin.mechanism.links import links_of
+from fivebar_pin.mechanism.links import bodies_of, links_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.prepared import prepared_of
 
@@ -44,9 +44,9 @@ def outside(chain: ClosedChain, external: Mapping[str, Array], n: int) -> Outsid
     """Return wrenches (n, 6) by frame as the engine takes them."""
     if not external:
         return _NO_LINKS, _NO_POINTS, np.empty((n, 0, 6))
-    links = {0: (0, np.eye(3))} | {x.joint: (j, x.axes) for j, x in enumerate(links_of(chain.model), start=1)}
+    bodies = bodies_of(links_of(chain.model))
     frames = [find_frame(chain.model, name) for name in external]
-    carried = [links[int(f.parentJoint)] for f in frames]
+    carried = [bodies[int(f.parentJoint)] for f in frames]
     points = np.array([axes.T @ f.placement.translation for (_, axes), f in zip(carried, frames, strict=True)])
     found = np.array([link for link, _ in carried], dtype=np.int64), points
     seal(found)

@@ -170,8 +170,13 @@ def _solve_inertia(inertia: Array, force: Array) -> Array:
         least = float(np.linalg.eigvalsh(unit)[:, 0].min())
         if least > _MASSLESS:
             return np.asarray(np.linalg.solve(unit, force / size[..., None]) / size[..., None])
-    raise InvalidInputError(
-        "inertia of the free motion",
+    raise massless("inertia of the free motion")
+
+
+def massless(name: str) -> InvalidInputError:
+    """Return the error of an inertia (k, k), called by this name, that is singular."""
+    return InvalidInputError(
+        name,
         "singular",
         "must be positive: some motion of the mechanism moves no mass",
         "Give the bodies mass and inertia, or the joints an armature.",

@@ -6,13 +6,12 @@ mechanism does not shake by the digits of its weight; the weight has a run of it
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.engine.threads import threads_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 
 __all__ = ["HangingTree", "hanging_tree"]
@@ -35,9 +34,7 @@ class HangingTree:
             )
             model.appendBodyToJoint(ids[j], source.inertias[j], pin.SE3.Identity())
         model.armature = np.concatenate([np.zeros(6), source.armature])
-        self._threads = max(
-            1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        )
+        self._threads = threads_of(None)
         self._pool = pin.ModelPool(model, self._threads)
         self._nv = int(model.nv)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract", "nsz", "arcp"}}
 _WITHIN: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _HERE = Path(__file__).resolve().parent
+_kept_code = cache(kept_code)  # it reads all sources of the folders
 _CONFIG: Any = numba.config  # what the environment says, NUMBA_CACHE_DIR among it
 
 
@@ -33,7 +35,7 @@ def compiled(function: F) -> F:
 
 def entry(function: F) -> F:
     """Compile a function that Python calls; its machine code is kept for the next process where a place is found."""
-    place = kept_code((_HERE, Path(function.__code__.co_filename).resolve().parent))
+    place = _kept_code((_HERE, Path(function.__code__.co_filename).resolve().parent))
     if place is None:
         unkept: F = numba.njit(**_OPTIONS)(function)
         return unkept

@@ -60,14 +60,11 @@ class Closed:
         q: configurations (n, nq).
         residual: largest closure residual (n,) [m or rad], all rows.
         correction: size of all the Newton steps together (n,) [rad, or chain lengths].
-        sigma, sign: of the passive Jacobian at the last step, see `PassiveMap` (n,), (n, groups).
     """
 
     q: Array
     residual: Array
     correction: Array
-    sigma: Array
-    sign: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,21 +122,20 @@ def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:
     """
     n = q.shape[0]
     if not loops.m:
-        return Closed(np.array(q), np.zeros(n), np.zeros(n), np.ones(n), np.ones((n, 0)))
+        return Closed(np.array(q), np.zeros(n), np.zeros(n))
     if n > _BLOCK:
         parts = [polish(loops, q[k : k + _BLOCK], iterations=iterations) for k in range(0, n, _BLOCK)]
         return Closed(*(np.concatenate([getattr(part, name) for part in parts]) for name in Closed.__slots__))
-    rule = _Passive(loops, n)
+    rule = _Passive(n)
     q = iterate(loops, q, rule, most=iterations)
-    return Closed(q, rule.size, rule.correction, rule.sigma, rule.sign)
+    return Closed(q, rule.size, rule.correction)
 
 
 class _Passive:
     """Plain Newton steps of the passive coordinates. Samples that are done wait for the others."""
 
-    def __init__(self, loops: Loops, n: int) -> None:
+    def __init__(self, n: int) -> None:
         self.size, self.correction = np.full(n, np.inf), np.zeros(n)
-        self.sigma, self.sign = np.zeros(n), np.zeros((n, loops.groups))
         self._last = np.zeros(n, dtype=np.bool_)
 
     def __call__(self, here: Configurations, which: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.bool_]]:
@@ -148,7 +144,6 @@ class _Passive:
         if finished.all():
             return here.q, ~finished
         step = -here.passive.solve(here.residual)
-        self.sigma[which], self.sign[which] = here.passive.sigma, here.passive.sign
         lost = ~np.isfinite(step).all(axis=1)
         step[finished | lost] = 0.0
         self.size[which[lost]] = np.inf

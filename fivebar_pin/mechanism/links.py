@@ -5,7 +5,7 @@ A joint of several axes in a row is several links. Everything that a joint does 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.engine import tables as e
 from fivebar_pin.errors import InvalidInputError
 
-__all__ = ["Link", "links_of"]
+__all__ = ["Link", "bodies_of", "links_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +99,11 @@ def links_of(model: pin.Model) -> list[Link]:
             q, v = q + _COORDINATES.get(part.kind, 1), v + len(columns)
         last[j] = parent
     return links
+
+
+def bodies_of(links: Sequence[Link]) -> dict[int, tuple[int, Array]]:
+    """Return, by joint of the model, the number of the link that carries its body, and the link's `axes`."""
+    return {0: (0, np.eye(3))} | {x.joint: (k, x.axes) for k, x in enumerate(links, start=1)}
 
 
 def _parts(model: pin.Model, joint: pin.JointModel) -> Iterator[_Part]:

@@ -96,11 +96,6 @@ class Loops:
             done += r
 
     @property
-    def groups(self) -> int:
-        """Number of independent groups of closures."""
-        return len(self._groups)
-
-    @property
     def independent(self) -> list[Group]:
         """The groups of closures that share no passive joint."""
         return self._groups

@@ -45,7 +45,6 @@ class PassiveMap:
         X: per group, pseudo-inverse of the passive columns of its reduced rows (n, np_g, r_g); nan where singular.
         sigma: lower estimate of their smallest singular value over all groups, scaled [-] (n,).
         sign: sign of their determinant, per group; one where they are not square (n, groups).
-        tall: those that are not square, scaled (n, r_g, np_g): see `rank.same_side`.
         size: number of passive and actuated coordinates.
     """
 
@@ -53,7 +52,6 @@ class PassiveMap:
     X: list[Array]
     sigma: Array
     sign: Array
-    tall: list[Array]
     size: tuple[int, int]
 
     def solve(self, rows: Array) -> Array:
@@ -74,7 +72,7 @@ class PassiveMap:
 
 def passive_map(groups: list[Group], blocks: list[Array], n: int, size: tuple[int, int]) -> PassiveMap:
     """Invert the passive columns of the Jacobian's blocks at n samples. Singular ones get sigma = 0 and X = nan."""
-    X, tall, sigma, sign = [], [], np.full(n, 1.0), np.ones((n, len(groups)))
+    X, sigma, sign = [], np.full(n, 1.0), np.ones((n, len(groups)))
     for k, (g, J) in enumerate(zip(groups, blocks, strict=True)):
         Jp = np.matmul(g.reduce, J[:, :, g.passive_columns]) * g.scale
         if g.is_square:
@@ -84,9 +82,8 @@ def passive_map(groups: list[Group], blocks: list[Array], n: int, size: tuple[in
                 smallest = 1.0 / np.sqrt(np.einsum("nij,nij->n", inverted, inverted))
         else:
             inverted, smallest = pseudo_inverse(Jp)
-            tall.append(Jp)
         X.append(g.scale[:, None] * inverted)
         if g.passive.size:
             smallest = np.where(np.isfinite(smallest), smallest, 0.0)
             sigma = smallest if len(groups) == 1 else np.minimum(sigma, smallest)
-    return PassiveMap(groups, X, sigma, sign, tall, size)
+    return PassiveMap(groups, X, sigma, sign, size)

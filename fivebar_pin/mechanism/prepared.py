@@ -13,7 +13,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
 from fivebar_pin.closures.rows import Row
-from fivebar_pin.engine.tables import NQ, Integers
+from fivebar_pin.engine.tables import Integers
 from fivebar_pin.mechanism.layout import Index, Parts, blocks_of, joined_rows, layout_of
 from fivebar_pin.mechanism.links import links_of
 from fivebar_pin.mechanism.loops import Loops, loops_of
@@ -33,7 +33,6 @@ class Prepared:
     Attributes:
         I: records of the chain, never written.
         W: its constants, and working memory as it is before the first sample; never written.
-        nq: length of a configuration.
         turns: which motors come back to the same pose after a whole turn, and which of these do not count turns (na,)
             each.
         left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they
@@ -47,7 +46,6 @@ class Prepared:
     ) -> None:
         (self.I, self.W), self.turns, self.left = vectors, turns, left
         self.mixed, self.vanishing = mixes
-        self.nq = int(self.I[NQ])
         seal((*vectors, *turns, *mixes))
         self._threads = threading.local()
 

@@ -32,7 +32,6 @@ __all__ = [
     "factored",
     "pseudo_inverse",
     "ranks_of",
-    "same_side",
     "singular_values",
     "smallest_values",
     "truncated_inverse",
@@ -232,12 +231,3 @@ def pseudo_inverse(J: Array) -> tuple[Array, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         X = np.matmul(np.swapaxes(Vt, 1, 2) / s[:, None, :], np.swapaxes(U, 1, 2))
     return X, smallest
-
-
-def same_side(before: list[Array], after: list[Array]) -> npt.NDArray[np.bool_]:
-    """Tell whether no singularity lies between tall matrices (..., r, k): square ones show it in their determinant.
-
-    A column combination that passes through zero turns round, which makes det(A^T B) negative.
-    """
-    sides = [np.linalg.det(np.matmul(np.swapaxes(A, -1, -2), B)) > 0.0 for A, B in zip(before, after, strict=True)]
-    return np.asarray(np.all(sides, axis=0))

@@ -16,7 +16,7 @@ from fivebar_pin._arrays import Array, cross
 from fivebar_pin.chain.coordinates import q_slice, v_slice
 from fivebar_pin.engine import tables as e
 from fivebar_pin.mechanism.layout import Parts, layout_of
-from fivebar_pin.mechanism.links import Link, links_of
+from fivebar_pin.mechanism.links import Link, bodies_of, links_of
 from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["Poses", "Rates", "Tree", "motion_cross"]
@@ -104,9 +104,9 @@ class Tree:
             if joint is not None:
                 self.support[j] = self.support[joint.parent]
                 self.support[j, joint.v] = True
-        last = {x.joint: k for k, x in enumerate(links, start=1)}
-        self._bodies = np.array([0, *(last[j] for j in range(1, self.njoints))], dtype=np.int64)
-        self._turns = np.stack([np.eye(3), *(links[last[j] - 1].axes.T for j in range(1, self.njoints))])
+        bodies = bodies_of(links)
+        self._bodies = np.array([bodies[j][0] for j in range(self.njoints)], dtype=np.int64)
+        self._turns = np.stack([bodies[j][1].T for j in range(self.njoints)])
         self._I, self._W = layout_of(Parts(_Bare(model), links, (), (), (), np.ones(self.nv), 1.0))
 
     def _memory(self) -> Array:

@@ -9,7 +9,7 @@ import fivebar_pin as fb
 from fivebar_pin._arrays import frozen
 from fivebar_pin.engine import entries
 from fivebar_pin.engine import tables as e
-from fivebar_pin.mechanism.links import links_of
+from fivebar_pin.mechanism.links import bodies_of, links_of
 from fivebar_pin.mechanism.prepared import prepared_of
 
 
@@ -24,8 +24,7 @@ class Sampled:
     def __init__(self, chain: fb.ClosedChain) -> None:
         prepared = prepared_of(chain)
         self.chain, self.I, self.W = chain, prepared.I, np.array(prepared.W)
-        links = links_of(chain.model)
-        self.last = {x.joint: (k, x.axes) for k, x in enumerate(links, start=1)}  # link of a joint's body
+        self.last = bodies_of(links_of(chain.model))  # link of a joint's body
 
     def numbers(self, field: int, count: int) -> np.ndarray:
         """Return a view of the numbers whose place a field of the header tells."""
