@@ -191,6 +191,25 @@ def rscr(*, base: pin.SE3 = AT_ORIGIN) -> tuple[fb.ClosedChain, np.ndarray]:
     return fb.ClosedChain(model, (closure,), ("crank",)), q
 
 
+def scapula(*, base: pin.SE3 = AT_ORIGIN) -> tuple[fb.ClosedChain, np.ndarray]:
+    """Return a plate that rolls on an ellipsoid, held by three driven legs (universal joint, slide, ball), and q."""
+    model = pin.Model()
+    model.name = "scapula"
+    plate = add(model, 0, pin.JointModelEllipsoid(0.3, 0.2, 0.45), base, "plate", body(1))
+    q, legs = [0.2, -0.3, 0.4], []
+    for k in range(3):
+        foot = base * at(0.87 * np.cos(2.1 * k), 0.87 * np.sin(2.1 * k), -0.09, (0.8, 0.0, 2.1 * k + 0.1))
+        cross = add(model, 0, pin.JointModelUniversal(*np.eye(3)[:2]), foot, f"foot{k}", body(2 + k))
+        legs.append(add(model, cross, pin.JointModelPZ(), at(), f"leg{k}", body(5 + k)))
+        q += [0.1, 0.2, 0.7]
+    q = np.array(q)
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    ends = [pin.SE3(np.eye(3), np.array(data.oMi[leg].translation)) for leg in legs]
+    closures = [close_at(model, q, (leg, plate), "3d", end) for leg, end in zip(legs, ends, strict=True)]
+    return fb.ClosedChain(model, closures, tuple(f"leg{k}" for k in range(3))), q
+
+
 def bennett() -> tuple[fb.ClosedChain, np.ndarray]:
     """Return Bennett's overconstrained 4R loop (mobility 1 against -2 by count), and a closed q.
 

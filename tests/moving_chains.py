@@ -6,7 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-from mechanisms import TILTED, bennett, double_four_bar, five_bar, rscr, rssr, slider_crank, welded_four_bar
+from mechanisms import (
+    TILTED,
+    bennett,
+    double_four_bar,
+    five_bar,
+    rscr,
+    rssr,
+    scapula,
+    slider_crank,
+    welded_four_bar,
+)
 from tied_chains import EXAMPLES
 
 import fivebar_pin as fb
@@ -20,6 +30,7 @@ BUILT = {
     "slider-crank": lambda: (slider_crank(base=TILTED), None),
     "RSSR": lambda: (rssr(base=TILTED), None),
     "RSCR": rscr,
+    "plate on an ellipsoid": lambda: scapula(base=TILTED),
     "Bennett": bennett,
     "double four-bar": lambda: (double_four_bar(), np.array([1.4, 1.4, -1.4, -1.4, 1.4])),
     **EXAMPLES,

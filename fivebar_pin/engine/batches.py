@@ -60,6 +60,7 @@ from fivebar_pin.engine.tables import (
     UNIT,
     V_HERE,
     VELOCITY,
+    WAY,
     WRENCH,
     Integers,
     X,
@@ -106,7 +107,7 @@ def subspace(I: Integers, W: Array, c: int) -> tuple[Vector, Vector]:
     e, turning, zero = axis_at(W, I[c + AXIS]), I[c + MOTION] != SHIFT, (0.0, 0.0, 0.0)
     carried = cross(vector_at(W, I[c + CENTRE]), e)
     slide = 0.0 if I[c + MOTION] == TURN else W[I[c + PITCH]]
-    return add(carried if turning else zero, scaled(slide, e)), e if turning else zero
+    return add(carried if turning else zero, scaled(slide, axis_at(W, I[c + WAY]))), e if turning else zero
 
 
 @entry

@@ -67,6 +67,7 @@ from fivebar_pin.engine.tables import (
     TURN,
     TWIST,
     V_HERE,
+    WAY,
     WIDTH,
     Integers,
     V,
@@ -106,7 +107,7 @@ def twists(I: Integers, W: Array) -> None:
                 if I[c + MOTION] != SHIFT:
                     omega = add(omega, axis)
                 if I[c + MOTION] != TURN:
-                    v = add(v, scaled(W[I[c + PITCH]], axis))
+                    v = add(v, scaled(W[N] * W[I[c + PITCH]], axis_at(W, I[c + WAY])))
                 c, N = c + COLUMN_SIZE, N + I[NA]
             put(W, here + ANGULAR, omega)
             put(W, here + LINEAR, v)
@@ -207,7 +208,7 @@ def joint_forces(I: Integers, W: Array) -> None:
             if I[c + MOTION] != SHIFT:
                 W[k] += dot(axis, n)
             if I[c + MOTION] != TURN:
-                W[k] += W[I[c + PITCH]] * dot(axis, f)
+                W[k] += W[I[c + PITCH]] * dot(axis_at(W, I[c + WAY]), f)
             c += COLUMN_SIZE
         r = sub(vector_at(W, I[j + POSE] + ORIGIN), vector_at(W, I[j + PARENT_POSE] + ORIGIN))
         push(W, I[j + PARENT_LOAD] + FORCE, f)

@@ -39,8 +39,11 @@ from fivebar_pin.engine.tables import (
     ENTRIES,
     ENTRIES_END,
     ENTRY_CENTRE,
+    ENTRY_MOTION,
+    ENTRY_PITCH,
     ENTRY_SIZE,
     FOLLOWED,
+    HELIX,
     J_BEFORE,
     J_HERE,
     JACOBIAN,
@@ -268,15 +271,19 @@ def _change(I: Integers, W: Array, r: int) -> tuple[float, float]:
 def _travel_and_arm(I: Integers, W: Array, r: int) -> tuple[float, float]:
     """Return how far the joints of a loop have moved together, and the longest arm of one to the closure, scaled.
 
-    An arm counts as one at least. A rod of length ρ turns by 1 / ρ for a unit of travel of its ends, which makes its
-    derivatives larger. Each closure counts once, with its first row; one that ties coordinates is straight.
+    An arm counts as one at least, and is longer by the lead of a joint that slides as it turns. A rod of length ρ
+    turns by 1 / ρ for a unit of travel of its ends, which makes its derivatives larger. Each closure counts once, with
+    its first row; one that ties coordinates is straight.
     """
     point, square, travel = vector_at(W, I[r + WRENCH] + POINT), 0.0, 0.0
     curved = r == I[I[r + CLOSURE] + ROW0] and I[r + SORT] != RATIOS
     for e in range(I[r + ENTRIES], I[r + ENTRIES_END] if curved else I[r + ENTRIES], ENTRY_SIZE):
         travel += abs(W[I[MOVED] + I[e + COLUMN]]) / W[I[SCALE] + I[e + COLUMN]]
         arm = sub(point, vector_at(W, I[e + ENTRY_CENTRE]))
-        square = max(square, dot(arm, arm))
+        reach = dot(arm, arm)
+        if I[e + ENTRY_MOTION] == HELIX:
+            reach = (sqrt(reach) + abs(W[I[e + ENTRY_PITCH]])) ** 2
+        square = max(square, reach)
     longest = max(1.0, W[I[r + DIRECTION] + UNIT] * sqrt(square)) if curved else 0.0
     rod = 1.0 + sqrt(square) / W[I[r + DIRECTION] + OFFSET] if I[r + SORT] == LENGTH else 1.0
     return travel, longest * rod * rod

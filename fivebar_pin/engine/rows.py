@@ -35,6 +35,7 @@ from fivebar_pin.engine.tables import (
     ENTRY_MOTION,
     ENTRY_PITCH,
     ENTRY_SIZE,
+    ENTRY_WAY,
     FORCE,
     FRAMES,
     JACOBIAN0,
@@ -192,7 +193,8 @@ def _unit_motion(I: Integers, W: Array, e: int, point: Vector) -> tuple[Vector, 
     motion, pitch = I[e + ENTRY_MOTION], W[I[e + ENTRY_PITCH]]
     turns = 0.0 if motion == SHIFT else 1.0
     slides = 0.0 if motion == TURN else pitch
-    return scaled(turns, axis), add(scaled(turns, across), scaled(slides, axis))
+    way = scaled(I[e + SIGN] * slides, axis_at(W, I[e + ENTRY_WAY]))
+    return scaled(turns, axis), add(scaled(turns, across), way)
 
 
 @compiled

@@ -45,21 +45,20 @@ HEADER = 58
     REACHED, REACHED_END,
 ) = range(17)  # fmt: skip
 LINK_SIZE = 17
-REVOLUTE, TURNING, SLIDE, SCREW, BALL, PLANAR, FREE = range(1, 8)  # kinds; of a TURNING one q is (cos, sin)
+REVOLUTE, TURNING, SLIDE, SCREW, BALL, PLANAR, FREE, EGG = range(1, 9)  # kinds; of a TURNING one q is (cos, sin)
 
-# Fields of a column, that is of a velocity coordinate: places of its axis and of the origin of its link, whether it
-# turns, slides or, as a screw, both; place of its lead; what tells it: the record of a block, or -1 - a for motor a.
-AXIS, CENTRE, MOTION, PITCH, OWNER, QS, QS_KIND = range(7)
-COLUMN_SIZE = 7
+# Fields of a column, that is of a velocity coordinate: places of the axis that it turns about, of the vector that it
+# slides along, and of the origin of its link; whether it turns, slides or, as a screw, does both; place of its lead;
+# what tells it: the record of a block, or -1 - a for motor a.
+AXIS, WAY, CENTRE, MOTION, PITCH, OWNER, QS, QS_KIND = range(8)
+COLUMN_SIZE = 8
 TURN, SHIFT, HELIX = range(3)
 
 # Fields of a closure and of its entries, the columns that move it.
 POSE1, POSE2, RATE1, RATE2, FRAMES, ROW0, ROW0_END, ENTRY0, ENTRY0_END, TIES = range(10)
 CLOSURE_SIZE = 10
-COLUMN, SIGN, LOCAL, ENTRY_AXIS, ENTRY_CENTRE, ENTRY_MOTION, ENTRY_PITCH, RATIO = range(
-    8
-)  # LOCAL: place in its block, or -1
-ENTRY_SIZE = 8
+COLUMN, SIGN, LOCAL, ENTRY_AXIS, ENTRY_WAY, ENTRY_CENTRE, ENTRY_MOTION, ENTRY_PITCH, RATIO = range(9)
+ENTRY_SIZE = 9  # LOCAL: place in its block, or -1
 
 # Fields of a row.
 SORT, DIRECTION, RESIDUAL, LEAD, WRENCH, JACOBIAN0, ENTRIES, ENTRIES_END, CLOSURE = range(9)
@@ -77,7 +76,13 @@ SPRING_SIZE = 8
 BETWEEN, AT_JOINT, AT_TURNING = range(3)
 
 # Numbers in W.
-ROTATION, ORIGIN, LEADING, ALIGNED = 0, 9, 12, 13  # of a pose, of a placement; see `Link.pitch`; 1: axes not turned
+ROTATION, ORIGIN, LEADING, ALIGNED, RADII = (
+    0,
+    9,
+    12,
+    13,
+    14,
+)  # of a pose, of a placement; see `Link.pitch`; 1: axes not turned
 MASS_CENTRE, MOMENTS = 1, 4  # of a mass; moments xx, xy, yy, xz, yz, zz about the centre
 ARMATURE, DAMPING, FRICTION = range(3)  # of losses
 SECOND_FRAME = 12  # of frames

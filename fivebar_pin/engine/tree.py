@@ -16,6 +16,7 @@ from math import atan2, cos, sin, sqrt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.compiled import compiled
+from fivebar_pin.engine.ellipsoids import roll, rolling
 from fivebar_pin.engine.tables import (
     A_HERE,
     ACCELERATION,
@@ -26,6 +27,7 @@ from fivebar_pin.engine.tables import (
     COLUMN0,
     COLUMN_SIZE,
     DOF,
+    EGG,
     FIXED,
     FREE,
     KIND,
@@ -53,6 +55,7 @@ from fivebar_pin.engine.tables import (
     TURNING,
     V_HERE,
     VELOCITY,
+    WAY,
     Integers,
     Q,
     V,
@@ -109,6 +112,9 @@ def place(I: Integers, W: Array) -> None:
         elif kind == FREE:
             p = add(p, times(R, vector_at(W, k)))
             R = product(R, _of_quaternion(W, k + 3))
+        elif kind == EGG:
+            R, d = roll(I, W, j, R)
+            p = add(p, d)
         put_matrix(W, I[j + POSE] + ROTATION, R)
         put(W, I[j + POSE] + ORIGIN, p)
 
@@ -148,6 +154,9 @@ def _accelerate(
     I: Integers, W: Array, j: int, turning: Vector, sliding: Vector, turning_rate: Vector, sliding_rate: Vector
 ) -> None:
     """Write the accelerations of a link from those of its parent and from the rates of its joint."""
+    if I[j + KIND] == EGG:  # which moves its own axes
+        turning_more, sliding_more = rolling(I, W, j, turning, sliding)
+        turning_rate, sliding_rate = add(turning_rate, turning_more), add(sliding_rate, sliding_more)
     parent, here = I[j + PARENT_RATE], I[j + RATE]
     omega, alpha = vector_at(W, parent + OMEGA), vector_at(W, parent + ALPHA)
     r = sub(vector_at(W, I[j + POSE] + ORIGIN), vector_at(W, I[j + PARENT_POSE] + ORIGIN))
@@ -167,7 +176,7 @@ def own(I: Integers, W: Array, j: int, rates: int) -> tuple[Vector, Vector]:
         if I[c + MOTION] != SHIFT:
             turning = add(turning, axis)
         if I[c + MOTION] != TURN:
-            sliding = add(sliding, scaled(W[I[c + PITCH]], axis))
+            sliding = add(sliding, scaled(W[k] * W[I[c + PITCH]], axis_at(W, I[c + WAY])))
         c += COLUMN_SIZE
     return turning, sliding
 
@@ -179,6 +188,8 @@ def integrate(I: Integers, W: Array, x: int) -> None:
         kind, k, i = I[j + KIND], I[j + Q], x + I[j + V]
         if kind in (REVOLUTE, SLIDE, SCREW):
             W[k] += W[i]
+        elif kind == EGG:
+            put(W, k, add(vector_at(W, k), vector_at(W, i)))
         elif kind == TURNING:
             _turn(W, k, W[i])
         elif kind == BALL:

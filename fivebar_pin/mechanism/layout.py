@@ -283,7 +283,8 @@ class _Layout:
             R, p = x.placed(self.axes[int(self.model.parents[x.joint])], self.dimensions.joints[x.joint])
         R = R.reshape(-1, 9)
         aligned = np.all(np.eye(3).ravel() == R, axis=1)
-        return np.column_stack([R, p, np.full(len(p), x.pitch), aligned])
+        shape = np.broadcast_to(x.radii, (len(p), len(x.radii)))
+        return np.column_stack([R, p, np.full(len(p), x.pitch), aligned, shape])
 
     def _mass(self, j: int) -> int:
         """Return the place of mass, mass centre and moments about it in the axes of a link, or -1 where it has none."""
@@ -372,6 +373,12 @@ class _Layout:
             "pivots": [self._room(b.columns.size) for b in parts.blocks],
             "weak": [self._room(b.columns.size, 1.0) for b in parts.blocks],
         }
+        for name in ("turns", "ways"):  # axes that joints turn about and slide along: mostly those of their links
+            own = [
+                self._room(9) if x.kind == e.EGG else pose
+                for x, pose in zip(parts.links, places["pose"][1:], strict=True)
+            ]
+            places[name] = [-1, *own]
         head[[e.POSES, e.RATES, e.LOADS]] = places["pose"][0], places["rate"][0], places["load"][0]
         return places
 
@@ -398,7 +405,7 @@ class _Layout:
         columns: int,
     ) -> None:
         at = self._begin(e.LINKS, e.LINK_SIZE, len(self.parts.links) + 1)
-        ground = Link(0, 0, 0, 0, 0, np.eye(3), np.zeros(3), np.eye(3), 0.0, (), np.eye(4), True)
+        ground = Link(0, 0, 0, 0, 0, np.eye(3), np.zeros(3), np.eye(3), 0.0, (), np.eye(4), True, ())
         for j, x in enumerate([ground, *self.parts.links]):
             self._set(
                 at + e.LINK_SIZE * j,
@@ -423,7 +430,8 @@ class _Layout:
                 self._set(
                     columns + e.COLUMN_SIZE * k,
                     {
-                        e.AXIS: memory["pose"][j] + axis, e.CENTRE: memory["pose"][j] + e.ORIGIN, e.MOTION: motion,
+                        e.AXIS: memory["turns"][j] + axis, e.WAY: memory["ways"][j] + axis,
+                        e.CENTRE: memory["pose"][j] + e.ORIGIN, e.MOTION: motion,
                         e.PITCH: constants["fixed"][j] + e.LEADING, e.OWNER: owner.get(k, blocks),
                         e.QS: self.head[e.Q_HERE] + x.q, e.QS_KIND: x.kind,
                     },
@@ -478,8 +486,8 @@ class _Layout:
         at = e.HEADER + len(self.records)
         for k, sign in zip(anchored.columns, signs, strict=True):
             c = self.head[e.COLUMNS] - e.HEADER + e.COLUMN_SIZE * int(k)
-            axis, centre, motion, pitch = self.records[c : c + 4]
-            self._write([int(k), int(sign), places.get(int(k), -1), axis, centre, motion, pitch, next(ratios)])
+            axis, way, centre, motion, pitch = self.records[c : c + 5]
+            self._write([int(k), int(sign), places.get(int(k), -1), axis, way, centre, motion, pitch, next(ratios)])
         return at
 
     def _fill_blocks(

@@ -34,6 +34,7 @@ class Link:
         columns: axis and motion of every velocity coordinate.
         within: pose (4, 4) on the joint's placement, or on the link of the same joint before.
         first: whether it is the first link of its joint.
+        radii: of the ellipsoid that it rolls on, along its axes, as parts of the pitch, the longest one; else none.
     """
 
     joint: int
@@ -48,6 +49,7 @@ class Link:
     columns: tuple[tuple[int, int], ...]
     within: Array
     first: bool
+    radii: tuple[float, ...]
 
     def placed(self, before: Array, placements: Array) -> tuple[Array, Array]:
         """Return axes (n, 3, 3) and origin (n, 3) on the parent, whose axes are `before`, for placements (n, 4, 4)."""
@@ -63,6 +65,7 @@ class _Part:
     placement: pin.SE3
     axis: Array  # in its own axes
     pitch: float = 1.0
+    radii: tuple[float, ...] = ()
 
 
 _TURN, _SHIFT, _HELIX = ((2, motion) for motion in (e.TURN, e.SHIFT, e.HELIX))
@@ -74,8 +77,9 @@ _COLUMNS: dict[int, tuple[tuple[int, int], ...]] = {
     e.BALL: tuple((k, e.TURN) for k in range(3)),
     e.PLANAR: ((0, e.SHIFT), (1, e.SHIFT), _TURN),
     e.FREE: (*((k, e.SHIFT) for k in range(3)), *((k, e.TURN) for k in range(3))),
+    e.EGG: ((0, e.HELIX), (1, e.HELIX), _TURN),
 }
-_COORDINATES = {e.TURNING: 2, e.BALL: 4, e.PLANAR: 4, e.FREE: 7}
+_COORDINATES = {e.TURNING: 2, e.BALL: 4, e.PLANAR: 4, e.FREE: 7, e.EGG: 3}
 _Z = np.array([0.0, 0.0, 1.0])
 _WHOLE = {"JointModelSpherical": e.BALL, "JointModelPlanar": e.PLANAR, "JointModelFreeFlyer": e.FREE}
 
@@ -91,7 +95,9 @@ def links_of(model: pin.Model) -> list[Link]:
         for part in _parts(model, model.joints[j]):
             turn, columns = _to_z(part.axis), _COLUMNS[part.kind]
             within, first = np.array(part.placement.homogeneous), parent == last[int(model.parents[j])]
-            link = Link(j, parent, part.kind, q, v, np.eye(3), np.zeros(3), turn, part.pitch, columns, within, first)
+            link = Link(
+                j, parent, part.kind, q, v, np.eye(3), np.zeros(3), turn, part.pitch, columns, within, first, part.radii
+            )
             R, p = link.placed(axes[parent], np.array(placement.homogeneous)[None])
             links.append(replace(link, R=R[0], p=p[0]))
             parent, placement = len(links), pin.SE3.Identity()
@@ -114,11 +120,17 @@ def _parts(model: pin.Model, joint: pin.JointModel) -> Iterator[_Part]:
         for sub, placement in zip(composite.joints, composite.jointPlacements, strict=True):
             first = placement
             for part in _parts(model, sub):
-                yield _Part(part.kind, first * part.placement, part.axis, part.pitch)
+                yield replace(part, placement=first * part.placement)
                 first = pin.SE3.Identity()
         return
     if name in _WHOLE:
         yield _Part(_WHOLE[name], here, _Z)
+        return
+    if name == "JointModelEllipsoid":
+        egg = joint.extract() if hasattr(joint, "extract") else joint
+        radii = [float(x) for x in (egg.radius_x, egg.radius_y, egg.radius_z)]
+        longest = max(map(abs, radii)) or 1.0
+        yield _Part(e.EGG, here, _Z, longest, tuple(x / longest for x in radii))
         return
     S = _subspace(model, joint)
     linear, angular = S[:3], S[3:]
@@ -140,7 +152,7 @@ def _parts(model: pin.Model, joint: pin.JointModel) -> Iterator[_Part]:
     elif joint.nv:
         raise InvalidInputError(
             "joint kind", name, "is not known", "Known are those of one axis, and the composite, universal, spherical, "
-            "translation, planar and free-flyer joints.",
+            "ellipsoid, translation, planar and free-flyer joints.",
         )  # fmt: skip
 
 

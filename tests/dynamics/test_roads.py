@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from mechanisms import TILTED, at, five_bar, slider_crank
+from joints import JOINTS
+from mechanisms import TILTED, five_bar, slider_crank
 from moving_chains import NAMES, loaded, moving, pushed
 from random_chains import random_chain, random_inertia, random_placement
 
@@ -23,29 +24,6 @@ from fivebar_pin.errors import InvalidInputError, SolverError, UnknownNameError
 ABOUT = (0.2, -0.4, 0.3)
 EQUAL = 1e-12  # of the sizes of what adds up
 QUANTITIES = ("torque", "shaking_force", "shaking_moment", "frame_force", "frame_moment")
-SLANTED = np.array([0.2, -0.6, 0.77]) / np.linalg.norm([0.2, -0.6, 0.77])
-
-
-def composite() -> object:
-    joint = pin.JointModelComposite(pin.JointModelRX(), pin.SE3.Identity())
-    joint.addJoint(pin.JointModelPY(), at(0.1, 0.2, 0.0))
-    joint.addJoint(pin.JointModelRZ(), at(0.0, 0.1, 0.3, (0.2, 0.0, 0.4)))
-    return joint
-
-
-JOINTS = {
-    "slanted hinge": lambda: pin.JointModelRevoluteUnaligned(SLANTED),
-    "unbounded hinge": pin.JointModelRUBY,
-    "slanted slide": lambda: pin.JointModelPrismaticUnaligned(SLANTED),
-    "spherical": pin.JointModelSpherical,
-    "spherical ZYX": pin.JointModelSphericalZYX,
-    "translation": pin.JointModelTranslation,
-    "planar": pin.JointModelPlanar,
-    "free flyer": pin.JointModelFreeFlyer,
-    "screw": lambda: pin.JointModelHelicalUnaligned(SLANTED, 0.2),
-    "composite": composite,
-    "universal": lambda: pin.JointModelUniversal(np.array([1.0, 0, 0]), np.array([0, 0.6, 0.8])),
-}
 
 
 def assert_equal(one: fb.Loads, two: fb.Loads) -> None:

@@ -3,85 +3,27 @@
 from __future__ import annotations
 
 import calls
+import joints
 import numpy as np
 import pinocchio as pin
 import pytest
-from mechanisms import add, at, body
+from joints import JOINTS
+from mechanisms import at
 from sampled import Sampled
 
 import fivebar_pin as fb
 from fivebar_pin.engine import entries
 from fivebar_pin.engine import tables as e
-from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.links import links_of
 
-SLANTED = np.array([0.2, -0.6, 0.77]) / np.linalg.norm([0.2, -0.6, 0.77])
 TIGHT = 1e-12  # of the largest number: the same sums in another order
 HERE, FAR = at(), at(300.0, -1000.0, 50.0, (0.3, -1.2, 2.0))
 PLACES = {"at the origin": HERE, "far from it": FAR}
 
 
-def composite(*joints: object) -> object:
-    """Return several joints in one, each placed on the one before."""
-    rng = np.random.default_rng(len(joints))
-    made = pin.JointModelComposite(joints[0], at(*rng.normal(size=3), rng.normal(size=3)))
-    for joint in joints[1:]:
-        made.addJoint(joint, at(*rng.normal(size=3), rng.normal(size=3)))
-    return made
-
-
-def slanted_unbounded() -> object:
-    """Return an unbounded hinge about a slanted axis; only the URDF reader makes one."""
-    axis = " ".join(repr(float(x)) for x in SLANTED)
-    links = '<link name="base"/><link name="arm"/>'
-    hinge = f'<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="{axis}"/></joint>'
-    return pin.buildModelFromXML(f'<robot name="r">{links}{hinge}</robot>').joints[1]
-
-
-def nested() -> object:
-    inner = composite(pin.JointModelRUBY(), pin.JointModelSpherical(), pin.JointModelHZ(0.2))
-    return composite(pin.JointModelPX(), inner, pin.JointModelRX())
-
-
-JOINTS = {
-    "RX": pin.JointModelRX,
-    "RY": pin.JointModelRY,
-    "RZ": pin.JointModelRZ,
-    "revolute": lambda: pin.JointModelRevoluteUnaligned(SLANTED),
-    "revolute against z": lambda: pin.JointModelRevoluteUnaligned(np.array([0.0, 0.0, -1.0])),
-    "RUBX": pin.JointModelRUBX,
-    "RUBY": pin.JointModelRUBY,
-    "RUBZ": pin.JointModelRUBZ,
-    "revolute unbounded": lambda: slanted_unbounded(),
-    "PX": pin.JointModelPX,
-    "PY": pin.JointModelPY,
-    "PZ": pin.JointModelPZ,
-    "prismatic": lambda: pin.JointModelPrismaticUnaligned(SLANTED),
-    "HX": lambda: pin.JointModelHX(-0.4),
-    "HY": lambda: pin.JointModelHY(0.4),
-    "HZ": lambda: pin.JointModelHZ(0.3),
-    "helical": lambda: pin.JointModelHelicalUnaligned(SLANTED, -0.2),
-    "spherical": pin.JointModelSpherical,
-    "spherical ZYX": pin.JointModelSphericalZYX,
-    "translation": pin.JointModelTranslation,
-    "planar": pin.JointModelPlanar,
-    "free flyer": pin.JointModelFreeFlyer,
-    "universal": lambda: pin.JointModelUniversal(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.6, 0.8])),
-    "composite": lambda: composite(pin.JointModelRX(), pin.JointModelPY(), pin.JointModelRZ()),
-    "composite of wide ones": lambda: composite(pin.JointModelFreeFlyer(), pin.JointModelPlanar()),
-    "nested composite": nested,
-}
-
-
 def tree_with(joint: object, base: pin.SE3 = HERE) -> fb.ClosedChain:
-    """Return a tree, not depth-first, that has the joint at its root, in its middle and at a tip."""
-    model = pin.Model()
-    root = add(model, 0, joint(), base * at(0.1, -0.2, 0.3, (0.3, 0.2, -0.5)), "root", body(1))
-    middle = add(model, root, pin.JointModelRY(), at(0.4, 0.1, -0.1), "hinge", body(2))
-    branch = add(model, middle, joint(), at(0.2, 0.3, 0.2, (-0.4, 0.9, 0.1)), "branch", body(3))
-    add(model, root, pin.JointModelPX(), at(0.0, 0.3, 0.1, (0.9, 0.0, 0.3)), "slide", body(4))
-    add(model, 0, joint(), base * at(0.5, 0.5, 0.1, (0.4, 0.8, 0.3)), "second root", body(6))
-    add(model, branch, joint(), at(), "tip", body(5))
+    """Return a tree with the joint under a tilted gravity, with losses."""
+    model = joints.tree_with(joint, base)
     model.gravity.linear = np.array([0.7, -9.81, 0.3])
     rng = np.random.default_rng(9)
     for losses in (model.armature, model.damping, model.upperDryFrictionLimit):
@@ -137,7 +79,9 @@ def test_every_column_is_the_motion_of_its_coordinate(joint, base):
         for k, c in enumerate(s.records(e.COLUMNS, e.COLUMN_SIZE)):
             axis, centre = s.W[s.of(c, e.AXIS) :][:9:3][:3], s.W[s.of(c, e.CENTRE) :][:3]
             motion, lead = s.of(c, e.MOTION), s.W[s.of(c, e.PITCH)]
-            linear = axis if motion == e.SHIFT else np.cross(centre, axis) + (lead if motion == e.HELIX else 0.0) * axis
+            way = s.W[s.of(c, e.WAY) :][:9:3][:3]
+            slide = 0.0 * way if motion == e.TURN else lead * way
+            linear = slide if motion == e.SHIFT else np.cross(centre, axis) + slide
             angular = 0.0 * axis if motion == e.SHIFT else axis
             close_to(np.r_[linear, angular], expected[:, k])
 
@@ -193,13 +137,6 @@ def test_loads_of_a_tree_are_those_of_pinocchio(joint, base):
             np.r_[weight, np.cross(centre, weight)],
             5e-12 * max(1.0, np.abs(frame[i]).max() / np.abs(weight).max()),
         )
-
-
-def test_a_joint_that_moves_its_own_axes_is_refused_by_name():
-    model = pin.Model()
-    model.addJoint(0, pin.JointModelEllipsoid(0.3, 0.4, 0.5), at(), "egg")
-    with pytest.raises(InvalidInputError, match=r"JointModelEllipsoid.* is not known"):
-        links_of(model)
 
 
 def test_a_joint_that_does_not_move_carries_its_body():

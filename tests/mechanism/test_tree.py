@@ -8,68 +8,15 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pinocchio as pin
 import pytest
-from mechanisms import add, at, body, double_four_bar, five_bar, rscr, slider_crank
+from joints import JOINTS, tree_with
+from mechanisms import double_four_bar, five_bar, rscr, slider_crank
 
 import fivebar_pin as fb
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.bodies import Bodies, accelerations, body_rates, total_centre
 from fivebar_pin.mechanism.tree import Tree, motion_cross
 
-SLANTED = np.array([0.2, -0.6, 0.77]) / np.linalg.norm([0.2, -0.6, 0.77])
-
-
-def slanted_unbounded() -> object:
-    """Return an unbounded hinge about a slanted axis; only the URDF reader makes one."""
-    axis = " ".join(repr(float(x)) for x in SLANTED)
-    links = '<link name="base"/><link name="arm"/>'
-    hinge = f'<joint name="j" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="{axis}"/></joint>'
-    return pin.buildModelFromXML(f'<robot name="r">{links}{hinge}</robot>').joints[1]
-
-
-def composite() -> object:
-    """Return a hinge, a slide and a hinge in one joint."""
-    joint = pin.JointModelComposite(pin.JointModelRX(), pin.SE3.Identity())
-    joint.addJoint(pin.JointModelPY(), at(0.1, 0.2, 0.0))
-    joint.addJoint(pin.JointModelRZ(), at(0.0, 0.1, 0.3, (0.2, 0.0, 0.4)))
-    return joint
-
-
-JOINTS = {
-    "RX": pin.JointModelRX,
-    "RY": pin.JointModelRY,
-    "RZ": pin.JointModelRZ,
-    "revolute": lambda: pin.JointModelRevoluteUnaligned(SLANTED),
-    "RUBX": pin.JointModelRUBX,
-    "RUBY": pin.JointModelRUBY,
-    "RUBZ": pin.JointModelRUBZ,
-    "revolute unbounded": lambda: slanted_unbounded(),
-    "PX": pin.JointModelPX,
-    "PY": pin.JointModelPY,
-    "PZ": pin.JointModelPZ,
-    "prismatic": lambda: pin.JointModelPrismaticUnaligned(SLANTED),
-    "prismatic of another length": lambda: pin.JointModelPrismaticUnaligned(2.0 * SLANTED),
-    "spherical": pin.JointModelSpherical,
-    "spherical ZYX": pin.JointModelSphericalZYX,
-    "translation": pin.JointModelTranslation,
-    "planar": pin.JointModelPlanar,
-    "free flyer": pin.JointModelFreeFlyer,
-    "helical": lambda: pin.JointModelHZ(0.3),
-    "helical unaligned": lambda: pin.JointModelHelicalUnaligned(SLANTED, 0.2),
-    "composite": lambda: composite(),
-    "universal": lambda: pin.JointModelUniversal(np.array([1.0, 0, 0]), np.array([0, 0.6, 0.8])),
-}
 SAMPLES = 25  # above the number up to which the kernel falls back on Pinocchio itself
-
-
-def tree_with(joint: object) -> pin.Model:
-    """Return a branched tree that has the joint at its root, in its middle and at a tip."""
-    model = pin.Model()
-    root = add(model, 0, joint(), at(0.1, -0.2, 0.3, (0.3, 0.2, -0.5)), "root", body(1))
-    middle = add(model, root, pin.JointModelRY(), at(0.4, 0.1, -0.1), "hinge", body(2))
-    branch = add(model, middle, joint(), at(0.2, 0.3, 0.2, (-0.4, 0.9, 0.1)), "branch", body(3))
-    add(model, root, pin.JointModelPX(), at(0.0, 0.3, 0.1, (0.9, 0.0, 0.3)), "slide", body(4))
-    add(model, branch, joint(), at(), "tip", body(5))
-    return model
 
 
 def random_state(model: pin.Model, n: int = SAMPLES, seed: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
