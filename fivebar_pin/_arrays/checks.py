@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from math import isfinite
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -89,10 +90,15 @@ def checked(name: str, values: npt.ArrayLike, shape: tuple[int | None, ...]) -> 
     if array.ndim != len(shape) or any(s is not None and s != g for s, g in zip(shape, array.shape, strict=True)):
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
         raise InvalidInputError(f"shape of {name}", array.shape, f"must be {wanted}")
-    if not np.isfinite(array).all():
+    if not all_finite(array):
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InvalidInputError(f"{name}{list(index)}", float(array[index]), "must be finite")
     return array
+
+
+def all_finite(x: npt.NDArray[Any]) -> bool:
+    """Tell whether all numbers are finite."""
+    return int(np.count_nonzero(np.isfinite(x))) == x.size  # a quarter of the time of `all` where there are few
 
 
 def number(name: str, value: object, *, positive: bool = False, unit: str = "") -> float:
@@ -101,6 +107,8 @@ def number(name: str, value: object, *, positive: bool = False, unit: str = "") 
     Raises:
         InvalidInputError: not a number, not finite, or not positive where it must be.
     """
+    if type(value) is float and isfinite(value) and (value > 0.0 or not positive):
+        return value
     try:
         x = reals(name, value)  # type: ignore[arg-type]
     except InvalidInputError as error:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import cache
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -12,6 +13,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 V = TypeVar("V", bound="Immutable")
+
+names: Callable[[Any], tuple[str, ...]] = cache(lambda kind: tuple(f.name for f in fields(kind)))
+"""The names of the fields of a dataclass."""
 
 
 class Immutable:
@@ -24,11 +28,11 @@ class Immutable:
     __slots__ = ()
 
     def __post_init__(self) -> None:
-        for f in fields(self):  # type: ignore[arg-type]
-            seal(getattr(self, f.name))
+        for name in names(type(self)):
+            seal(getattr(self, name))
 
     def __reduce_ex__(self, protocol: object) -> tuple[Any, ...]:
-        state = {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+        state = {name: getattr(self, name) for name in names(type(self))}
         views = [name for name, content in state.items() if isinstance(content, MappingProxyType)]
         return _again, (type(self), {**state, **{name: dict(state[name]) for name in views}}, views)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
 import numpy as np
 
+from fivebar_pin._arrays.checks import all_finite
+from fivebar_pin._arrays.immutable import names
 from fivebar_pin.errors import InvalidInputError
 
 P = ParamSpec("P")
@@ -49,14 +51,14 @@ _SMALLER = "Check the units and sizes of what was given."
 def require_finite(name: str, result: object, open: tuple[str, ...] = ()) -> None:
     """Raise for infinity, and for nan outside the results named as open, in arrays and fields that hold them."""
     if isinstance(result, np.ndarray):
-        if result.dtype.kind in "fc" and not np.isfinite(result).all():
+        if result.dtype.kind in "fc" and not all_finite(result):
             bad = np.argwhere(np.isinf(result) if name in open else ~np.isfinite(result))
             if bad.size:
                 index = tuple(int(i) for i in bad[0])
                 raise InvalidInputError(f"{name}{list(index)}", result[index].item(), _BEYOND, _SMALLER)
     elif is_dataclass(result):
-        for f in fields(result):
-            require_finite(f.name, getattr(result, f.name), open)
+        for field in names(type(result)):
+            require_finite(field, getattr(result, field), open)
     elif isinstance(result, (tuple, Mapping)):
         for key, item in result.items() if isinstance(result, Mapping) else enumerate(result):
             require_finite(key if isinstance(key, str) else name, item, open)

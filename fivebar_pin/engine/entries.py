@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from math import pi
+
+from numpy import rint, trunc
+
 from fivebar_pin._arrays import Array
 from fivebar_pin.engine.bodies import drag, inertia_forces, joint_forces, torques, twists, weigh
 from fivebar_pin.engine.compiled import compiled, entry
@@ -12,9 +16,13 @@ from fivebar_pin.engine.springs import apply, pull
 from fivebar_pin.engine.tables import (
     A_HERE,
     CARRIED,
+    COLUMN_SIZE,
+    COLUMNS,
     DIRECTION,
+    FARTHEST,
     FOLLOWED,
     JOINT,
+    MOTORS,
     N_HERE,
     NA,
     NQ,
@@ -25,6 +33,7 @@ from fivebar_pin.engine.tables import (
     ROW_SIZE,
     ROWS,
     ROWS_END,
+    SCALE,
     SHAKING,
     SORT,
     STATUS,
@@ -36,10 +45,10 @@ from fivebar_pin.engine.tables import (
     V_HERE,
     Integers,
 )  # fmt: skip
-from fivebar_pin.engine.tree import accelerate, move, place
+from fivebar_pin.engine.tree import accelerate, coordinate, move, place, set_coordinate
 from fivebar_pin.engine.vectors import Vector, larger
 
-__all__ = ["drive", "loads", "need", "open_by", "read", "residual", "write", "write_matrix"]
+__all__ = ["bring", "drive", "loads", "need", "open_by", "read", "read_matrix", "write", "write_matrix"]
 
 
 @entry
@@ -72,12 +81,46 @@ def drive(
 
 
 @entry
-def residual(I: Integers, W: Array, q: Array) -> float:
-    """Return the largest closure residual at q[0] [m or rad]."""
+def bring(I: Integers, W: Array, turns: Integers, x: Array, most: float, q: Array, gap: Array) -> int:
+    """Bring q[0], where it is closed, along the straight line of the motors to x[0], and write its residual.
+
+    Whole turns of motors that come back to the same pose count for nothing: those whose coordinates are a cosine and a
+    sine (`turns` 2) go the short way, others (1) keep the sense in which they turn; 0 marks those that are counted.
+
+    Returns:
+        How many ends of the line were reached, 2 for both; -1 where q is open by more than `most`, -2 where the line is
+        so long that to follow it would take for ever.
+    """
     read(W, I[Q_HERE], q, 0, I[NQ])
     place(I, W)
     look(I, W)
-    return open_by(I, W)
+    if not open_by(I, W) <= most:
+        return -1
+    far = False
+    for a in range(I[NA]):
+        k = I[I[MOTORS] + a]
+        c = I[COLUMNS] + COLUMN_SIZE * k
+        at = coordinate(I, W, c)
+        whole = (x[0, a] - at) / (2.0 * pi)
+        whole = rint(whole) if turns[a] == 2 else (trunc(whole) if turns[a] == 1 else 0.0)
+        if whole != 0.0:
+            at += 2.0 * pi * whole
+            set_coordinate(I, W, c, at)
+        W[I[TO] + a] = at
+        far = far or not abs(x[0, a] - at) <= FARTHEST * W[I[SCALE] + k]
+    if far:
+        return -2
+    reached = 0
+    advance(I, W, True)
+    if W[I[STATUS]] == FOLLOWED:
+        reached = 1
+        read(W, I[TO], x, 0, I[NA])
+        advance(I, W, False)
+        if W[I[STATUS]] == FOLLOWED:
+            reached = 2
+            write(W, I[Q_HERE], q, 0, 0, I[NQ])
+            gap[0] = open_by(I, W)
+    return reached
 
 
 @entry

@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, checked, finite, integer, number, numeric
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.engine.tables import unwritten
 from fivebar_pin.errors import AssemblyError, SingularityError
-from fivebar_pin.kinematics.follow import open_by, reach
-from fivebar_pin.mechanism.closing import CLOSED, closed_enough, polish, residual_of, search
+from fivebar_pin.kinematics.follow import blocked, require_near
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough, most_open, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.prepared import Prepared, prepared_of
@@ -20,6 +21,7 @@ __all__ = ["assemble", "assemble_near", "checked_search", "closed_from_starts", 
 
 
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
+_TOO_FAR, _BOTH_ENDS = -2, 2  # how a way ended, see `engine.entries.bring`
 _NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
 _MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once
 _TURNS = 3.0  # half turns, either way, over which searches start for joints that count their turns
@@ -96,25 +98,37 @@ def checked_search(chain: ClosedChain, starts: int, seed: int, tolerance: float)
 
 def assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -> Array:
     """Return the configuration (nq,) at actuated coordinates x (na,) that a configuration (nq,) picks."""
-    loops, ready, q = loops_of(chain), prepared_of(chain), np.array(near[None])
-    if loops.m and closed_enough(loops, open_by(ready, q), _FOLLOWED) and not _opposed(loops, q):
-        turned, at = _turned(loops, ready, q, x)
-        try:
-            reached, gap = reach(loops, ready, turned[0], np.array([at, x]))
-        except SingularityError as error:
-            if error.sample:
-                raise
-            if np.array_equal(at, x) and closed_enough(loops, Configurations(loops, q).gap, tolerance)[0]:
-                return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
-        else:
-            if not closed_enough(loops, max(gap[1], ready.left), tolerance):
-                residual = residual_of(loops, reached[1:])[0]
-                raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()}")
-            return np.asarray(reached[1])
+    loops, q = loops_of(chain), np.array(near[None])
+    if loops.m and not _opposed(loops, q):
+        found = _brought(loops, prepared_of(chain), q, x, tolerance)
+        if found is not None:
+            return found
     loops.set_actuated(q, x)
     if not loops.m:
         return np.asarray(q[0])
     return _searched_near(loops, q, x, tolerance)
+
+
+def _brought(loops: Loops, ready: Prepared, q: Array, x: Array, tolerance: float) -> Array | None:
+    """Follow the branch of q (1, nq) to x (na,); None where q is open, or singular."""
+    from fivebar_pin.engine.entries import bring
+
+    I, W, there, gap = ready.I, ready.memory(), np.array(q), np.empty(1)
+    reached = bring(I, W, ready.turns, unwritten(x[None]), most_open(loops, _FOLLOWED), there, gap)
+    if reached == _BOTH_ENDS:
+        if max(gap[0], ready.left) <= most_open(loops, tolerance):
+            return np.asarray(there[0])
+        raise open_message(loops, residual_of(loops, there)[0], f"at the actuated coordinates {x.tolist()}")
+    at = loops.actuated_of(q)[0]
+    if reached == _TOO_FAR:
+        require_near(loops, np.array([at, x]))
+    if reached >= 0:
+        error = blocked(loops, I, W, x if reached else None)
+        if reached or not isinstance(error, SingularityError):
+            raise error
+        if np.array_equal(at, x) and closed_enough(loops, Configurations(loops, q).gap, tolerance)[0]:
+            return np.asarray(q[0])  # a search would not find it again: it converges badly at a singular place
+    return None
 
 
 def _opposed(loops: Loops, q: Array) -> bool:
@@ -142,22 +156,6 @@ def _nudged(loops: Loops, q: Array, x: Array) -> Array:
     starts = loops.tree.integrate(np.repeat(q, _NUDGES, axis=0), tangent)
     loops.set_actuated(starts, x)
     return starts
-
-
-def _turned(loops: Loops, ready: Prepared, q: Array, x: Array) -> tuple[Array, Array]:
-    """Return q (1, nq) with whole turns added that lead towards x (na,), and its actuated coordinates (na,).
-
-    A turn of a joint that no closure counts leads to the same pose. A joint whose coordinates are a cosine and a sine
-    is in the turn nearest to x; others keep the sense in which they turn.
-    """
-    at, (whole, cyclic) = loops.actuated_of(q)[0], ready.turns
-    turns = (x - at) / (2.0 * np.pi)
-    turns = np.where(cyclic, np.round(turns), np.where(whole, np.trunc(turns), 0.0))
-    if not turns.any():
-        return q, at
-    at, turned = at + 2.0 * np.pi * turns, np.array(q)
-    loops.set_actuated(turned, at)
-    return turned, at
 
 
 def closed_from_starts(

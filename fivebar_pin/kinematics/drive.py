@@ -13,7 +13,7 @@ from fivebar_pin.engine.threads import threads_of
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.kinematics.assemble import assemble, assemble_near
 from fivebar_pin.kinematics.follow import follow
-from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
+from fivebar_pin.mechanism.closing import CLOSED, most_open, residual_of
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.prepared import prepared_of
 from fivebar_pin.motion import Motion
@@ -78,17 +78,17 @@ def drive(
 
 def _require_closed(loops: Loops, q: Array, gap: Array, tolerance: float) -> None:
     """Raise where round-off leaves a sample further open than asked for."""
-    worst = int(np.argmax(gap))
-    if not closed_enough(loops, gap[worst], tolerance):
+    worst = int(gap.argmax())
+    if not gap[worst] <= most_open(loops, tolerance):
         error = open_message(loops, residual_of(loops, q[worst, None])[0], "at these actuated coordinates")
         error.sample = worst
         raise error
 
 
 def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
-    lower, upper = chain.model.lowerPositionLimit, chain.model.upperPositionLimit
+    lower, upper = prepared_of(chain).limits
     outside = (q < lower - _SLACK) | (q > upper + _SLACK)
-    if outside.any():
+    if np.count_nonzero(outside):
         k, i = (int(b) for b in np.argwhere(outside)[0])
         owner = int(np.searchsorted(np.array(chain.model.idx_qs)[1:], i, side="right"))
         raise InvalidInputError(

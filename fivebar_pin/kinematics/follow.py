@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fivebar_pin._arrays import Array, frozen
-from fivebar_pin.engine.tables import FARTHEST, NQ, Q_HERE, STATUS, TOGETHER, Integers
+from fivebar_pin.engine.tables import FARTHEST, NQ, Q_HERE, STATUS, TOGETHER, Integers, unwritten
 from fivebar_pin.engine.threads import each
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.mechanism.closing import closed_enough, search
@@ -23,11 +23,12 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, open_message
 from fivebar_pin.mechanism.prepared import Prepared
 
-__all__ = ["Followed", "blocked", "follow", "open_by", "reach", "require_near", "singular"]
+__all__ = ["Followed", "blocked", "follow", "require_near", "singular"]
 
 
 _CHUNK = 4096  # samples that are followed one after the other
 _SAME = 1e-9  # distance of closed configurations up to which they are one [rad, or chain lengths]
+_NOWHERE = frozen([np.nan])
 _OUT_OF_REACH = 1e-8  # closure residual that a search leaves where nothing closes, at least [m or rad]
 
 Blocked = AssemblyError | SingularityError | InvalidInputError
@@ -60,29 +61,6 @@ class Followed:
     def part(self, k: slice) -> Followed:
         """Return some samples, the same memory."""
         return Followed(self.q[k], self.v[k], self.a[k], self.N[k], self.gap[k])
-
-
-def reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, Array]:
-    """Return the configurations (n, nq) on the branch of q0 (nq,), closed at X[0], along straight lines to X (n, na).
-
-    Their closure residuals (n,) [m or rad] are the second result.
-
-    Raises:
-        SingularityError, AssemblyError: the way is blocked; with an attribute `sample` at the end not reached.
-        InvalidInputError: the closures tie the motors to each other; a line too long.
-    """
-    require_near(loops, X)
-    q, gap, error = _reach(loops, ready, q0, X)
-    if error is not None:
-        raise error
-    return q, gap
-
-
-def open_by(ready: Prepared, q: Array) -> float:
-    """Return the largest closure residual at q (1, nq) [m or rad], that of rows which say nothing left out."""
-    from fivebar_pin.engine.entries import residual
-
-    return float(residual(ready.I, ready.memory(), frozen(q)))
 
 
 def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int) -> Followed:
@@ -123,10 +101,10 @@ class _Chunk:
         self, loops: Loops, ready: Prepared, motion: tuple[Array, Array, Array], out: Followed, first: int, last: int
     ) -> None:
         self._loops, self._ready, self._first = loops, ready, first
-        self._q, self._v, self._a = (frozen(x[first:last]) for x in motion)
+        self._q, self._v, self._a = (unwritten(x[first:last]) for x in motion)
         self._line = motion[0][last - 1 : last + 1]
         self._out = out.part(slice(first, last))
-        self.begun = self.end = np.full(out.q.shape[1], np.nan)
+        self.begun = self.end = _NOWHERE
         self.error: Blocked | None = None
 
     def follow(self, begun: Array) -> None:
@@ -153,9 +131,9 @@ def _reach(loops: Loops, ready: Prepared, q0: Array, X: Array) -> tuple[Array, A
     """Return the configurations reached, nan where none were, their residuals, and why."""
     from fivebar_pin.engine.entries import drive
 
-    out, still = Followed.room(loops, len(X), q0.size), frozen(np.zeros_like(X))
+    out, still = Followed.room(loops, len(X), q0.size), unwritten(np.zeros_like(X))
     out.q[0] = q0
-    done = drive(ready.I, ready.memory(), frozen(X), still, still, out.q, out.v, out.a, out.N, out.gap)
+    done = drive(ready.I, ready.memory(), unwritten(X), still, still, out.q, out.v, out.a, out.N, out.gap)
     return out.q, out.gap, _at(_blocked(loops, ready, X[done], done), done) if done < len(X) else None
 
 

@@ -20,7 +20,19 @@ from fivebar_pin._arrays import TINY, Array
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops
 
-__all__ = ["CLOSED", "STEP", "Closed", "Limits", "Rule", "closed_enough", "iterate", "polish", "residual_of", "search"]
+__all__ = [
+    "CLOSED",
+    "STEP",
+    "Closed",
+    "Limits",
+    "Rule",
+    "closed_enough",
+    "iterate",
+    "most_open",
+    "polish",
+    "residual_of",
+    "search",
+]
 
 
 Rule = Callable[[Configurations, npt.NDArray[np.intp]], tuple[Array, npt.NDArray[np.bool_]]]
@@ -112,7 +124,12 @@ def residual_of(loops: Loops, q: Array) -> Array:
 
 def closed_enough(loops: Loops, residual: npt.ArrayLike, tolerance: float) -> npt.NDArray[np.bool_]:
     """Whether residuals (n,) [m or rad] are closed: below the tolerance times the chain's length (or one radian)."""
-    return np.asarray(np.asarray(residual) <= tolerance * max(1.0, loops.length))
+    return np.asarray(np.asarray(residual) <= most_open(loops, tolerance))
+
+
+def most_open(loops: Loops, tolerance: float) -> float:
+    """Return the residual up to which a configuration is closed: the tolerance times the chain's length (or 1 rad)."""
+    return tolerance * max(1.0, loops.length)
 
 
 def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:

@@ -6,7 +6,6 @@ import threading
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, seal
 from fivebar_pin.chain import ClosedChain
@@ -24,8 +23,6 @@ __all__ = ["Prepared", "parts_of", "prepared_of"]
 
 _SILENT = 1e-12  # share of the largest singular value that is the round-off of a row that says nothing [-]
 
-Flags = npt.NDArray[np.bool_]
-
 
 class Prepared:
     """The two vectors of the engine.
@@ -33,8 +30,9 @@ class Prepared:
     Attributes:
         I: records of the chain, never written.
         W: its constants, and working memory as it is before the first sample; never written.
-        turns: which motors come back to the same pose after a whole turn, and which of these do not count turns (na,)
-            each.
+        turns: 1 for motors that come back to the same pose after a whole turn, 2 for those of these whose coordinates
+            do not tell, else 0 (na,).
+        limits: of the coordinates (nq,) each, from the model.
         left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they
             are [m, rad or -].
         mixed: the rows of the engine as orthonormal combinations of those of the closures, both scaled (rows, m).
@@ -42,11 +40,16 @@ class Prepared:
     """
 
     def __init__(
-        self, vectors: tuple[Integers, Array], turns: tuple[Flags, Flags], left: float, mixes: tuple[Array, Array]
+        self,
+        vectors: tuple[Integers, Array],
+        turns: Integers,
+        limits: tuple[Array, Array],
+        left: float,
+        mixes: tuple[Array, Array],
     ) -> None:
-        (self.I, self.W), self.turns, self.left = vectors, turns, left
+        (self.I, self.W), self.turns, self.limits, self.left = vectors, turns, limits, left
         self.mixed, self.vanishing = mixes
-        seal((*vectors, *turns, *mixes))
+        seal((*vectors, turns, *limits, *mixes))
         self._threads = threading.local()
 
     def memory(self) -> Array:
@@ -62,7 +65,8 @@ def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
     loops = loops_of(chain)
     parts, mixes = _taken_apart(loops, chain)
-    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, mixes)
+    limits = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
+    return Prepared(layout_of(parts), _turns(chain, loops), limits, loops.left, mixes)
 
 
 def parts_of(chain: ClosedChain) -> Parts:
@@ -93,13 +97,14 @@ def _taken_apart(loops: Loops, chain: ClosedChain) -> tuple[Parts, tuple[Array, 
     return parts, _mixes(loops, [x.mixes for x in kept])
 
 
-def _turns(chain: ClosedChain, loops: Loops) -> tuple[Flags, Flags]:
-    """Return which motors come back to the same pose after a whole turn, and which of these do not count turns."""
+def _turns(chain: ClosedChain, loops: Loops) -> Integers:
+    """Return whether motors come back to the same pose after a whole turn, see `Prepared`."""
     names = {name for closure in chain.closures for name in closure.counted}
     counted = {int(chain.model.idx_vs[chain.model.getJointId(name)]) for name in names}
     motors = [int(k) for k in loops.actuated]
     whole = [loops.tree.is_angle(k) and k not in counted for k in motors]
-    return np.array(whole, dtype=np.bool_), np.array([loops.tree.is_cyclic(k) for k in motors], dtype=np.bool_)
+    cyclic = [loops.tree.is_cyclic(k) for k in motors]
+    return np.array([2 * c or int(w) for w, c in zip(whole, cyclic, strict=True)], dtype=np.int64)
 
 
 def _mixes(loops: Loops, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:

@@ -28,10 +28,9 @@ from tied_chains import EXAMPLES
 
 import fivebar_pin as fb
 from fivebar_pin.closures import Coupling
-from fivebar_pin.engine import closing, entries
+from fivebar_pin.engine import closing
 from fivebar_pin.engine import tables as e
 from fivebar_pin.engine.sweeping import left_open
-from fivebar_pin.kinematics.follow import open_by
 from fivebar_pin.mechanism.complement import complement_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
@@ -194,12 +193,12 @@ def test_a_motion_that_is_no_number_never_counts_as_closed(make):
     chain, q = make()
     prepared, q = prepared_of(chain), q[None]
     N = complement_of(Configurations(loops_of(chain), q))
-    assert open_by(prepared, q) < 1e-12
+    assert calls.residual(prepared.I, prepared.memory(), q) < 1e-12
     assert left_open(prepared.I, prepared.memory(), q, N, 0) < 1e-9
     for k in range(chain.nq):
         lost = np.array(q)
         lost[0, k] = np.nan
-        assert open_by(prepared, lost) == np.inf
+        assert calls.residual(prepared.I, prepared.memory(), lost) == np.inf
         assert left_open(prepared.I, prepared.memory(), lost, N, 0) == np.inf
     for k in range(chain.nv):
         lost = np.array(N)
@@ -228,7 +227,7 @@ def test_the_gap_that_is_told_is_in_metres_and_radians(make):
         moved = moved_by(chain, q, size)
         expected = Configurations(loops_of(chain), moved[None]).gap[0]
         s = Sampled(chain)
-        found = entries.residual(s.I, s.W, moved[None])
+        found = calls.residual(s.I, s.W, moved[None])
         if all(s.of(r, e.SORT) == e.RATIOS or s.of(r, e.SORT) == e.LENGTH for r in s.rows):
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
         else:  # rows of points are combined, which moves the largest by no more than this

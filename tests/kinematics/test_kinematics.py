@@ -603,3 +603,23 @@ def test_a_way_out_of_reach_is_told_from_a_way_through_a_singularity():
     with pytest.raises(AssemblyError, match="cannot be assembled at these actuated coordinates: closure tip") as info:
         fb.assemble(chain, [np.pi, 0.0], near)
     assert info.value.residual == pytest.approx(0.9 + 0.6 + 0.5 - 1.5, rel=1e-3)
+
+
+@pytest.mark.parametrize("samples", [1, 3])
+def test_a_way_to_the_first_sample_that_is_blocked_is_told_of_the_first_sample(samples):
+    """A five-bar that cannot reach where the motion begins."""
+    chain = five_bar((0.5, 0.8, 0.7, 0.6, 0.9))
+    near = fb.assemble(chain, [2.0, 1.0])
+    x = np.tile([np.pi, 0.0], (samples, 1))
+    still = np.zeros_like(x)
+    with pytest.raises(AssemblyError, match=r"^sample 0 \(t = 5 s\)") as caught:
+        fb.drive(chain, fb.Motion(5.0 + np.arange(float(samples)), x, still, still), near)
+    assert (caught.value.sample, caught.value.time) == (0, 5.0)
+
+
+def test_a_way_too_long_to_follow_to_the_first_sample_is_refused():
+    """A slide that is to start a billion metres off."""
+    chain = slider_crank().with_actuated(("slider",))
+    near = fb.diagnose(chain).q
+    with pytest.raises(InvalidInputError, match=r"step of motor 0 .* must be below"):
+        fb.assemble(chain, [1e12], near)

@@ -9,6 +9,7 @@ from fivebar_pin.engine import blocks, closing, following, rows
 from fivebar_pin.engine import tree as trees
 from fivebar_pin.engine.bodies import reduced_inertia, twists
 from fivebar_pin.engine.compiled import entry
+from fivebar_pin.engine.entries import open_by, read
 from fivebar_pin.engine.tables import (
     CLOSED,
     COLUMN_SIZE,
@@ -20,6 +21,7 @@ from fivebar_pin.engine.tables import (
     MOTORS,
     MOVED,
     NA,
+    NQ,
     NV,
     Q_BEFORE,
     Q_HERE,
@@ -114,6 +116,15 @@ def step(I, W):
 def largest(I, W):
     """Return the largest residual that stands there."""
     return closing.largest_residual(I, W)
+
+
+@entry
+def residual(I, W, q):
+    """Return the largest closure residual at q[0]."""
+    read(W, I[Q_HERE], q, 0, I[NQ])
+    trees.place(I, W)
+    rows.look(I, W)
+    return open_by(I, W)
 
 
 @entry
