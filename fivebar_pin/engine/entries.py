@@ -88,8 +88,8 @@ def bring(I: Integers, W: Array, turns: Integers, x: Array, most: float, q: Arra
     sine (`turns` 2) go the short way, others (1) keep the sense in which they turn; 0 marks those that are counted.
 
     Returns:
-        How many ends of the line were reached, 2 for both; -1 where q is open by more than `most`, -2 where the line is
-        so long that to follow it would take for ever.
+        How many ends of the line were reached: 2 for both, or q stays as it is. -1 where q is open by more than `most`,
+        -2 where the line is so long that to follow it would take for ever.
     """
     read(W, I[Q_HERE], q, 0, I[NQ])
     place(I, W)

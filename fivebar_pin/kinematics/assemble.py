@@ -110,15 +110,15 @@ def assemble_near(chain: ClosedChain, x: Array, near: Array, tolerance: float) -
 
 
 def _brought(loops: Loops, ready: Prepared, q: Array, x: Array, tolerance: float) -> Array | None:
-    """Follow the branch of q (1, nq) to x (na,); None where q is open, or singular."""
+    """Follow the branch of q (1, nq) to x (na,), in place; None, and nothing done, where q is open, or singular."""
     from fivebar_pin.engine.entries import bring
 
-    I, W, there, gap = ready.I, ready.memory(), np.array(q), np.empty(1)
-    reached = bring(I, W, ready.turns, unwritten(x[None]), most_open(loops, _FOLLOWED), there, gap)
+    I, W, gap = ready.I, ready.memory(), np.empty(1)
+    reached = bring(I, W, ready.turns, unwritten(x[None]), most_open(loops, _FOLLOWED), q, gap)
     if reached == _BOTH_ENDS:
         if max(gap[0], ready.left) <= most_open(loops, tolerance):
-            return np.asarray(there[0])
-        raise open_message(loops, residual_of(loops, there)[0], f"at the actuated coordinates {x.tolist()}")
+            return np.asarray(q[0])
+        raise open_message(loops, residual_of(loops, q)[0], f"at the actuated coordinates {x.tolist()}")
     at = loops.actuated_of(q)[0]
     if reached == _TOO_FAR:
         require_near(loops, np.array([at, x]))

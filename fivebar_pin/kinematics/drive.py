@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fivebar_pin._arrays import Array, checked, finite, number, seal
+from fivebar_pin._arrays import Array, checked, finite, integer, number, seal
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.engine.threads import threads_of
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.kinematics.assemble import assemble, assemble_near
 from fivebar_pin.kinematics.follow import follow
 from fivebar_pin.mechanism.closing import CLOSED, most_open, residual_of
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
+from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.prepared import prepared_of
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
@@ -55,6 +55,8 @@ def drive(
         InvalidInputError: motion of the wrong width, joint limits passed, motion left undetermined.
     """
     number("tolerance", tolerance, positive=True)
+    if threads is not None:
+        integer("threads", threads, least=1)
     loops = loops_of(chain)
     loops.require_determined()
     if motion.na != chain.na:
@@ -66,7 +68,7 @@ def drive(
             q0 = assemble(chain, motion.q[0], tolerance=tolerance)
         else:
             q0 = assemble_near(chain, motion.q[0], checked("near", near, (chain.nq,)), tolerance)
-        found = follow(loops, prepared_of(chain), q0, (motion.q, motion.v, motion.a), threads_of(threads))
+        found = follow(loops, prepared_of(chain), q0, (motion.q, motion.v, motion.a), threads)
         _require_closed(loops, found.q, found.gap, tolerance)
     except (AssemblyError, SingularityError) as error:
         raise _with_time(error, motion) from None
@@ -85,10 +87,17 @@ def _require_closed(loops: Loops, q: Array, gap: Array, tolerance: float) -> Non
         raise error
 
 
+@once_per_chain
+def _limits(chain: ClosedChain) -> tuple[Array, Array]:
+    """Return the limits of the coordinates (nq,), a little wider than the model has them."""
+    return np.array(chain.model.lowerPositionLimit) - _SLACK, np.array(chain.model.upperPositionLimit) + _SLACK
+
+
 def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:
-    lower, upper = prepared_of(chain).limits
-    outside = (q < lower - _SLACK) | (q > upper + _SLACK)
+    lower, upper = _limits(chain)
+    outside = (q < lower) | (q > upper)
     if np.count_nonzero(outside):
+        lower, upper = chain.model.lowerPositionLimit, chain.model.upperPositionLimit
         k, i = (int(b) for b in np.argwhere(outside)[0])
         owner = int(np.searchsorted(np.array(chain.model.idx_qs)[1:], i, side="right"))
         raise InvalidInputError(

@@ -15,7 +15,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array, frozen
 from fivebar_pin.engine.tables import FARTHEST, NQ, Q_HERE, STATUS, TOGETHER, Integers, unwritten
-from fivebar_pin.engine.threads import each
+from fivebar_pin.engine.threads import each, threads_of
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.mechanism.closing import closed_enough, search
 from fivebar_pin.mechanism.complement import complement_of
@@ -54,16 +54,18 @@ class Followed:
     def room(loops: Loops, n: int, nq: int) -> Followed:
         """Return room for n samples, the configurations nan."""
         nv, na = loops.tree.nv, loops.actuated.size
-        return Followed(
-            np.full((n, nq), np.nan), np.empty((n, nv)), np.empty((n, nv)), np.empty((n, nv, na)), np.empty(n)
-        )
+        q = np.empty((n, nq))
+        q.fill(np.nan)
+        return Followed(q, np.empty((n, nv)), np.empty((n, nv)), np.empty((n, nv, na)), np.empty(n))
 
     def part(self, k: slice) -> Followed:
         """Return some samples, the same memory."""
         return Followed(self.q[k], self.v[k], self.a[k], self.N[k], self.gap[k])
 
 
-def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int) -> Followed:
+def follow(
+    loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array, Array], threads: int | None
+) -> Followed:
     """Follow the branch of q0 (nq,), closed at the first sample, along a motion of the motors: q, v, a (n, na) each.
 
     Raises:
@@ -79,7 +81,7 @@ def follow(loops: Loops, ready: Prepared, q0: Array, motion: tuple[Array, Array,
     else:
         begun, _, _ = _reach(loops, ready, q0, X[::_CHUNK])
         begun[0] = q0
-        each(lambda c: chunks[c].follow(begun[c]), len(chunks), threads)
+        each(lambda c: chunks[c].follow(begun[c]), len(chunks), threads_of(threads))
     for chunk, after in zip(chunks, [*chunks[1:], None], strict=True):
         if chunk.error is not None:
             raise chunk.error

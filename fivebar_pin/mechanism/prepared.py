@@ -32,7 +32,6 @@ class Prepared:
         W: its constants, and working memory as it is before the first sample; never written.
         turns: 1 for motors that come back to the same pose after a whole turn, 2 for those of these whose coordinates
             do not tell, else 0 (na,).
-        limits: of the coordinates (nq,) each, from the model.
         left: residual of the combinations of rows that no motion changes: they say nothing, and stay open where they
             are [m, rad or -].
         mixed: the rows of the engine as orthonormal combinations of those of the closures, both scaled (rows, m).
@@ -40,16 +39,11 @@ class Prepared:
     """
 
     def __init__(
-        self,
-        vectors: tuple[Integers, Array],
-        turns: Integers,
-        limits: tuple[Array, Array],
-        left: float,
-        mixes: tuple[Array, Array],
+        self, vectors: tuple[Integers, Array], turns: Integers, left: float, mixes: tuple[Array, Array]
     ) -> None:
-        (self.I, self.W), self.turns, self.limits, self.left = vectors, turns, limits, left
+        (self.I, self.W), self.turns, self.left = vectors, turns, left
         self.mixed, self.vanishing = mixes
-        seal((*vectors, turns, *limits, *mixes))
+        seal((*vectors, turns, *mixes))
         self._threads = threading.local()
 
     def memory(self) -> Array:
@@ -65,8 +59,7 @@ def prepared_of(chain: ClosedChain) -> Prepared:
     """Return a chain as the engine sees it, made once."""
     loops = loops_of(chain)
     parts, mixes = _taken_apart(loops, chain)
-    limits = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
-    return Prepared(layout_of(parts), _turns(chain, loops), limits, loops.left, mixes)
+    return Prepared(layout_of(parts), _turns(chain, loops), loops.left, mixes)
 
 
 def parts_of(chain: ClosedChain) -> Parts:
