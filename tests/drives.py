@@ -213,7 +213,7 @@ def reference(chain: fb.ClosedChain, home: Array, motion: fb.Motion, clear: floa
         return "too near to a singularity"
     if not _is_one_way(loops, path.q[LEAD:], path.N[LEAD:], X[LEAD:], sigma):
         return "too coarse to be sure"
-    return Drive(motion, path.q[LEAD::fine], float(sigma.min()))
+    return Drive(motion, np.array(path.q[LEAD::fine]), float(sigma.min()))  # a view would keep all of it
 
 
 def _followed(chain: fb.ClosedChain, home: Array, X: Array) -> fb.Trajectory:

@@ -110,18 +110,20 @@ def lower(W: Array, A: int, n: int, b: int, pivots: int) -> None:
 def upper(W: Array, A: int, n: int, b: int) -> None:
     """Solve U x = b in place, U the upper triangle of A."""
     for i in range(n - 1, -1, -1):
+        total = W[b + i]
         for k in range(i + 1, n):
-            W[b + i] -= W[A + i * n + k] * W[b + k]
-        W[b + i] *= W[A + i * n + i]
+            total -= W[A + i * n + k] * W[b + k]
+        W[b + i] = total * W[A + i * n + i]
 
 
 @compiled
 def upper_back(W: Array, A: int, n: int, b: int) -> None:
     """Solve U^T x = b in place."""
     for i in range(n):
+        total = W[b + i]
         for k in range(i):
-            W[b + i] -= W[A + k * n + i] * W[b + k]
-        W[b + i] *= W[A + i * n + i]
+            total -= W[A + k * n + i] * W[b + k]
+        W[b + i] = total * W[A + i * n + i]
 
 
 @compiled
