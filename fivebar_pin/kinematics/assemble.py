@@ -17,9 +17,17 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 
-__all__ = ["assemble", "assemble_near", "checked_search", "closed_from_starts", "closure_residual"]
+__all__ = [
+    "assemble",
+    "assemble_near",
+    "assemble_somewhere",
+    "checked_search",
+    "closed_from_starts",
+    "closure_residual",
+]
 
 
+STARTS = 64  # of a search, unless told otherwise
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
 _TOO_FAR, _BOTH_ENDS = -2, 2  # how a way ended, see `engine.entries.bring`
 _NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
@@ -33,7 +41,7 @@ def assemble(
     q_actuated: npt.ArrayLike,
     near: npt.ArrayLike | None = None,
     *,
-    starts: int = 64,
+    starts: int = STARTS,
     seed: int = 0,
     tolerance: float = CLOSED,
 ) -> Array:
@@ -56,7 +64,7 @@ def assemble(
         AssemblyError: the loops do not close; names the closure that stays open and by how much.
         SingularityError: the way from `near` is blocked by a singularity.
     """
-    loops = checked_search(chain, starts, seed, tolerance)
+    checked_search(chain, starts, seed, tolerance)
     x = numeric("q_actuated", q_actuated)
     if x.ndim == 2:
         each = [assemble(chain, row, near, starts=starts, seed=seed, tolerance=tolerance) for row in x]
@@ -64,9 +72,17 @@ def assemble(
     x = checked("q_actuated", x, (chain.na,))
     if near is not None:
         return assemble_near(chain, x, checked("near", near, (chain.nq,)), tolerance)
+    return assemble_somewhere(chain, x, starts, seed, tolerance)
+
+
+def assemble_somewhere(
+    chain: ClosedChain, x: Array, starts: int = STARTS, seed: int = 0, tolerance: float = CLOSED
+) -> Array:
+    """Return a configuration (nq,) at actuated coordinates x (na,), on the branch of a named one that leads there."""
     for reference in chain.references.values():
         with contextlib.suppress(AssemblyError, SingularityError):
             return assemble_near(chain, x, reference, tolerance)
+    loops = loops_of(chain)
     q, residual = closed_from_starts(chain, loops, x, starts, seed, tolerance)
     if not q.shape[0]:
         raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")

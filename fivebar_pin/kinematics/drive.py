@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, checked, finite, integer, number, seal
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
-from fivebar_pin.kinematics.assemble import assemble, assemble_near
+from fivebar_pin.kinematics.assemble import assemble_near, assemble_somewhere
 from fivebar_pin.kinematics.follow import follow
 from fivebar_pin.mechanism.closing import CLOSED, most_open, residual_of
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
@@ -65,7 +65,7 @@ def drive(
         )
     try:
         if near is None:
-            q0 = assemble(chain, motion.q[0], tolerance=tolerance)
+            q0 = assemble_somewhere(chain, motion.q[0], tolerance=tolerance)
         else:
             q0 = assemble_near(chain, motion.q[0], checked("near", near, (chain.nq,)), tolerance)
         found = follow(loops, prepared_of(chain), q0, (motion.q, motion.v, motion.a), threads)
