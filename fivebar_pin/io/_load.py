@@ -18,6 +18,7 @@ from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
 from fivebar_pin.io._entries import UNLIMITED, TreeEntry
+from fivebar_pin.io._mjcf_include import mechanism_files
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import MAX_SIDECAR_BYTES, Sidecar, read_sidecar
 from fivebar_pin.io._urdf import read_urdf
@@ -123,6 +124,8 @@ def mechanism_file(path: Path) -> Path:
     for ending in (".urdf", ".xml"):
         found = _in_folder(path, (ending,))
         named = [f for f in found if f.stem in ("robot", path.name)]
+        if len(found) > 1 and ending == ".xml" and not named:
+            found = mechanism_files(found)
         if len(found) == 1 or len(named) == 1:
             return (named or found)[0]
         if found:

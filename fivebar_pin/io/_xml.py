@@ -53,8 +53,8 @@ class _Builder(ElementTree.TreeBuilder):
         raise FileFormatError(self._path, "has a DOCTYPE or entities, which are not read; remove the declaration")
 
 
-def parse_xml(path: Path, *, root: str, max_bytes: int = MAX_BYTES) -> ElementTree.Element:
-    """Return the root element of a file whose root tag must be `root`.
+def parse_xml(path: Path, *, root: str | None, max_bytes: int = MAX_BYTES) -> ElementTree.Element:
+    """Return the root element of a file whose root tag must be `root`; None takes any.
 
     Raises:
         FileFormatError: not readable, not well formed, hostile, or another kind of file.
@@ -67,7 +67,7 @@ def parse_xml(path: Path, *, root: str, max_bytes: int = MAX_BYTES) -> ElementTr
         raise
     except (ElementTree.ParseError, LookupError, ValueError, RecursionError) as error:
         raise FileFormatError(path, f"is not well-formed XML ({error})") from error
-    if not isinstance(element, ElementTree.Element) or element.tag != root:
+    if not isinstance(element, ElementTree.Element) or root not in (element.tag, None):
         raise FileFormatError(path, f"has the root element <{getattr(element, 'tag', None)}>; expected <{root}>")
     return element
 
