@@ -18,7 +18,7 @@ from fivebar_pin.io._left_out import left_out
 from fivebar_pin.io._mjcf_actuators import driven_joints
 from fivebar_pin.io._mjcf_adjust import adjust_masses
 from fivebar_pin.io._mjcf_assets import Assets
-from fivebar_pin.io._mjcf_equality import Equality, check_tendons
+from fivebar_pin.io._mjcf_equality import Equality
 from fivebar_pin.io._mjcf_include import including
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
 from fivebar_pin.io._mjcf_sections import check_sections, gravity
@@ -60,7 +60,6 @@ def read_mjcf(
     root, sources = including(path, max_bytes=max_bytes)
     reader = MjcfReader(path, root, sources)
     check_sections(reader, root)
-    check_tendons(reader, root)
     bodies = BodyTree(reader, Assets(reader, root))
     for worldbody in root.findall("worldbody"):
         bodies.world(worldbody)

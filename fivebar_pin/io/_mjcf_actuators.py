@@ -3,11 +3,12 @@
 An actuator drives the joint that it names, or that of a fixed tendon; of a tendon over several joints the first, where
 couplings tie them so that one motor moves all. One that acts elsewhere (at a site, on a body, between a crank and a
 slider, on a joint of several degrees of freedom) is told and left out. What an actuator adds to its joint, armature and
-damping times the square of its gear, moves the mechanism and is kept.
+damping times the square of its gear, moves the mechanism and is kept; so are the bounds of its force.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.closures import Closure, Coupling
 from fivebar_pin.errors import UnknownNameError
+from fivebar_pin.io._entries import UNLIMITED
 from fivebar_pin.io._mjcf_attributes import DRIVES
 from fivebar_pin.io._mjcf_equality import fixed_ratios
 from fivebar_pin.io._mjcf_reader import MjcfReader
@@ -31,7 +33,7 @@ def driven_joints(
 ) -> tuple[str, ...]:
     """Return the joints that the actuators drive, each once, and note what is left out."""
     tendons = {tendon.get("name", ""): tendon for tendon in root.findall("tendon/*")}
-    names: list[str] = []
+    forces: dict[str, tuple[float, float]] = {}
     for k, element in enumerate(root.findall("actuator/*")):
         where = f"{element.tag} {element.get('name', str(k))!r}"
         if element.tag not in DRIVES:
@@ -41,9 +43,12 @@ def driven_joints(
         if joint is None:
             continue
         _add(reader, full, bodies, joint, ratio, where)
-        if joint not in names:
-            names.append(joint)
-    return tuple(names)
+        low, high = _force_range(reader, full, bodies, ratio, where)
+        least, most = forces.get(joint, (0.0, 0.0))
+        forces[joint] = least + low, most + high
+    for joint, force in forces.items():
+        _limit(bodies, joint, force)
+    return tuple(forces)
 
 
 def _joint(
@@ -87,7 +92,7 @@ def _add(
     reader: MjcfReader, actuator: ElementTree.Element, bodies: BodyTree, joint: str, ratio: float, where: str
 ) -> None:
     """Add armature and damping of an actuator, seen through its gear, to the joint that it drives."""
-    gear = reader.number(actuator.get("gear", "1").split()[0], "gear", where)
+    gear = _gear(reader, actuator, where)
     for word in _ADDED:
         (value,) = reader.numbers(actuator, word, 1, where, [0.0])
         if value and not ratio:
@@ -95,6 +100,36 @@ def _add(
         if value:
             old = bodies.data.setdefault(joint, {}).get(word, [0.0])[0]
             bodies.data[joint][word] = [old + value * (gear * ratio) ** 2]
+
+
+def _gear(reader: MjcfReader, actuator: ElementTree.Element, where: str) -> float:
+    return reader.number(actuator.get("gear", "1").split()[0], "gear", where)
+
+
+def _force_range(
+    reader: MjcfReader, actuator: ElementTree.Element, bodies: BodyTree, ratio: float, where: str
+) -> tuple[float, float]:
+    """Return the least and largest force that an actuator lays on its joint; a motor's control is its force."""
+    gear = _gear(reader, actuator, where) * ratio
+    stated = [("forcelimited", "forcerange")] + [("ctrllimited", "ctrlrange")] * (actuator.tag == "motor")
+    ranges = [
+        sorted(gear * x for x in reader.numbers(actuator, bounds, 2, where, None))
+        for limited, bounds in stated
+        if bodies.limited(actuator, limited, bounds, where)
+    ]
+    if not ranges or not gear:
+        return -np.inf, np.inf
+    return max(low for low, _ in ranges), min(high for _, high in ranges)
+
+
+def _limit(bodies: BodyTree, joint: str, force: tuple[float, float]) -> None:
+    """Let the effort limits of a joint be those of its actuators where these are narrower."""
+    entry = bodies.joints[joint]
+    low = entry.data.get("effort_lower", [-UNLIMITED])[0]
+    high = entry.data["effort"][0]
+    if force[0] > low or force[1] < high:
+        data = {**entry.data, "effort": [min(high, force[1])], "effort_lower": [max(low, force[0])]}
+        bodies.joints[joint] = replace(entry, data=data)
 
 
 def _tied(ratios: dict[str, float], closures: tuple[Closure, ...]) -> bool:

@@ -23,27 +23,13 @@ from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameErro
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
 from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
 
-__all__ = ["FACTOR", "HINGE", "Equality", "check_tendons", "fixed_ratios"]
+__all__ = ["FACTOR", "HINGE", "Equality", "fixed_ratios"]
 
 HINGE, FACTOR = "revolute closure ", "coupling factor "
 """Names of <custom><numeric> entries that our writer makes.
 
 The axis of a hinge made of two connects; what the row of a joint equality, whose first ratio is one, is multiplied by.
 """
-
-_ACTING = (
-    "stiffness", "damping", "frictionloss", "armature", "limited", "range", "actuatorfrclimited", "actuatorfrcrange",
-)  # fmt: skip
-
-
-def check_tendons(reader: MjcfReader, root: ElementTree.Element) -> None:
-    """Refuse fixed tendons that act by themselves: they only couple joints. Spatial ones may be springs."""
-    for element in root.findall("tendon/fixed"):
-        full = reader.with_defaults(ElementTree.Element("tendon", element.attrib), None)
-        for word in _ACTING:
-            if full.get(word, "0").split()[:1] not in (["0"], ["0.0"], ["false"], ["auto"]):
-                where = f"{element.tag} {element.get('name', '')!r}"
-                raise reader.fail(where, f"{word} of a tendon is not supported; remove it or model it as a force")
 
 
 class Equality:

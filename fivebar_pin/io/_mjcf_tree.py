@@ -143,8 +143,9 @@ class BodyTree:
             raise reader.fail(where, str(UnknownNameError("joint type", word, _KINDS)))
         if word == "free" and count > 1:
             raise reader.fail(where, "a free joint must be the only one of its body")
-        if any(_plain(reader, element, "springdamper", where)):
-            raise reader.fail(where, "springdamper is not supported; remove it, and state stiffness and damping")
+        for attribute in ("springdamper", "springyield"):
+            if any(_plain(reader, element, attribute, where)):
+                raise reader.fail(where, f"{attribute} is not supported; remove it, and state stiffness and damping")
         self.spring(element, name, word, where)
         if word == "free":
             if "true" in (element.get("align"), reader.compiler.get("alignfree")):

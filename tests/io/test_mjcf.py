@@ -204,7 +204,20 @@ def test_a_free_joint_and_its_keyframe_come_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("<option", '<tendon><fixed stiffness="3"/></tendon><option', "stiffness of a tendon is not supported"),
+        (
+            "<option",
+            '<tendon><fixed stiffness="3"><joint joint="ja" coef="1"/><joint joint="jb" coef="1"/></fixed></tendon>'
+            "<option",
+            "stiffness and damping across 2 joints are not supported; state them at the joints",
+        ),
+        (
+            "<option",
+            '<tendon><fixed damping="3"><joint joint="jc" coef="1"/></fixed></tendon><option',
+            "fixed '0': is a spring on 'jc', which has several degrees of freedom",
+        ),
+        ("<option", '<tendon><fixed range="0 1"/></tendon><option', "fixed '0': range: limits of tendons"),
+        ("<option", "<tendon><cord/></tendon><option", "Unknown tendon 'cord'; known: fixed, spatial"),
+        ('name="jb"', 'name="jb" springyield="1"', "springyield is not supported"),
         (
             '<connect name="pin"',
             '<joint joint1="ja" joint2="jb" polycoef="0 1 0.5 0 0"/><connect name="pin"',
