@@ -1,7 +1,8 @@
 """One MJCF tree out of a file and those that it includes.
 
 MuJoCo puts the children of an included file's root, whatever that is called, where <include> stands; a name is looked
-up in the folder of the first file, then in that of the including one; and no file may come twice.
+up in the folder of the first file, then in that of the including one; and no file may come twice. An attribute
+without a value is none.
 """
 
 from __future__ import annotations
@@ -80,6 +81,8 @@ class _Merging:
                 children += self.included(child, chain, depth)
                 continue
             self.expand(child, chain, depth + 1)
+            for attribute in [word for word, text in child.attrib.items() if not text.strip()]:
+                del child.attrib[attribute]
             if len(chain) > 1:
                 self.sources.setdefault(element_key(child), chain[-1])
             children.append(child)
