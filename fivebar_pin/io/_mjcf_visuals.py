@@ -37,10 +37,10 @@ def geom_visual(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, l
         return []
     if not drawn:
         return []
-    if kind in _UNDRAWN:
+    if kind in _UNDRAWN and mesh is None:
         reader.left_out.append(_UNDRAWN[kind])
         return []
-    if kind == "mesh" and mesh is not None:
+    if kind in ("mesh", "sdf") and mesh is not None:
         placed = _placed(mesh)
         why = mesh.missing or _why_undrawn(mesh, placed)
         if why or placed is None:

@@ -55,7 +55,8 @@ def test_everything_that_does_not_move_the_mechanism_is_told(tmp_path: Path) -> 
         '<light/><geom type="plane" size="1 1 1"/><geom type="hfield" hfield="h"/><body name="m" mocap="true">'
         '<geom type="ellipsoid" size="0.1 0.2 0.3"/></body><body name="a" gravcomp="1"><joint/>'
         '<geom size="0.1"/></body></worldbody><contact><exclude body1="a" body2="m"/></contact>'
-        "<sensor><clock/><clock/></sensor></mujoco>"
+        "<sensor><clock/><clock/></sensor>"
+        '<custom><numeric name="n" data="1"/><text name="t" data="x"/></custom></mujoco>'
     )
     mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
     with pytest.warns(LeftOutWarning) as caught:
@@ -63,7 +64,7 @@ def test_everything_that_does_not_move_the_mechanism_is_told(tmp_path: Path) -> 
     assert str(caught[0].message).split("mechanism: ")[1] == (
         "height field asset, texture, contact exclusion, 2 sensors, density and viscosity of the fluid around it, "
         "2 lights, camera, plane, height field, mocap of body 'm', which stays where it is, ellipsoid shape, "
-        "gravity compensation"
+        "gravity compensation, 2 custom values"
     )
 
 

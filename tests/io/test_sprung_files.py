@@ -161,6 +161,12 @@ def test_springs_are_read_with_defaults_angles_and_automatic_lengths(tmp_path: P
             '<custom><numeric name="unbounded ja" data="1"/></custom><actuator>',
             "stiffness of a hinge that does not count its turns",
         ),
+        (
+            "<actuator>",
+            '<custom><numeric name="unbounded jc" data="1"/></custom><worldbody><body><joint name="jc" ref="1" '
+            'stiffness="0"/></body></worldbody><actuator>',
+            "joint 'jc': ref of a hinge that does not count its turns",
+        ),
     ],
 )
 def test_springs_of_mjcf_that_we_cannot_have_are_refused_by_name(
