@@ -87,6 +87,8 @@ def read_mjcf(
         if closures is not None or actuated is not None:
             raise
         raise FileFormatError(path, str(error)) from error
+    if bodies.compensated:
+        reader.left_out.append(f"gravcomp of {bodies.compensated} bodies, which are of full weight here")
     custom = [e.get("name", "") for e in root.findall("custom/*")]
     left_out(path, [*reader.left_out, *("custom value" for name in custom if not name.startswith(_OURS))])
     return chain

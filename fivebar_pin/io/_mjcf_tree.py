@@ -34,6 +34,7 @@ class BodyTree:
         poses: pose of each link in the world as the file places it.
         bodies: link of each body.
         places: pose of each body's link in its parent, as the file places it.
+        compensated: number of bodies with gravcomp.
         sites: link that stands for each named site.
         data: armature and losses per joint.
         springs: on joints, in the order of the joints.
@@ -48,6 +49,7 @@ class BodyTree:
         self.poses: dict[str, Array] = {WORLD: np.eye(4)}
         self.bodies: dict[str, str] = {WORLD: WORLD}
         self.places: dict[str, Array] = {}
+        self.compensated = 0
         self.sites: dict[str, str] = {}
         self.data: dict[str, dict[str, list[float]]] = {}
         self.springs: list[JointSpring] = []
@@ -93,7 +95,7 @@ class BodyTree:
             raise reader.fail(where, "is defined twice")
         reader.check_known(body, where)
         if any(_plain(reader, body, "gravcomp", where)):
-            reader.left_out.append("gravity compensation")
+            self.compensated += 1
         if body.get("mocap", "false") == "true":
             reader.left_out.append(f"mocap of {where}, which stays where it is")
         childclass = body.get("childclass", above)

@@ -150,7 +150,37 @@ SPLIT = """<mujoco><worldbody><body name="a"><joint name="ja"/><geom size="0.1"/
 
 
 def test_a_motor_on_a_tendon_of_joints_that_couplings_tie_drives_the_first(tmp_path: Path) -> None:
-    assert fb.load(write(tmp_path, SPLIT)).actuated == ("ja",)
+    """Its force is spread over several joints: it bounds the effort of none of them."""
+    bounded = SPLIT.replace('tendon="split"/>', 'tendon="split" forcerange="-1 1" ctrlrange="-1 1"/>')
+    chain = fb.load(write(tmp_path, bounded))
+    assert chain.actuated == ("ja",)
+    assert chain.model.upperEffortLimit[0] > 1e300
+
+
+def test_only_a_motors_control_is_its_force(tmp_path: Path) -> None:
+    for tag, bound in (("motor", 6.0), ("general", np.finfo(float).max)):
+        text = LINKAGE.replace("<motor", f"<{tag}")
+        assert fb.load(write(tmp_path, text)).model.upperEffortLimit[0] == bound
+
+
+def test_equalities_and_their_defaults_may_be_off(tmp_path: Path) -> None:
+    text = LINKAGE.replace('<equality solref="0.01 1"/>', '<equality active="false"/>')
+    with pytest.warns(LeftOutWarning, match="connect 'loop', which is not active, joint 'gear', which is not active"):
+        assert fb.load(write(tmp_path, text)).closures == ()
+
+
+def test_a_keyframe_without_an_orientation_has_the_neutral_one(tmp_path: Path) -> None:
+    text = '<mujoco><worldbody><body><freejoint name="f"/><geom size="0.1"/></body></worldbody><keyframe>'
+    chain = fb.load(write(tmp_path, text + '<key name="k" qpos="1 2 3 0 0 0 0"/></keyframe></mujoco>'))
+    np.testing.assert_array_equal(chain.references["k"], [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0])
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_array_equal(data.xquat[1], [1.0, 0.0, 0.0, 0.0])
+    with pytest.raises(FileFormatError, match="remove align or alignfree"):
+        text = text.replace("<worldbody>", '<compiler alignfree="true"/><worldbody>')
+        fb.load(write(tmp_path, text + "</keyframe></mujoco>"))
 
 
 @pytest.mark.parametrize(
@@ -163,6 +193,7 @@ def test_a_motor_on_a_tendon_of_joints_that_couplings_tie_drives_the_first(tmp_p
             "joint 'joint_1', which is",
         ),
         ('tendon="split"/>', 'joint="jd"/>', "general 'grip', which drives 'jd' of several degrees of freedom"),
+        ('coef="0.5"/></fixed>', 'coef="-0.5"/></fixed>', "general 'grip', which pulls the tendon 'split' of joints"),
         ('tendon="split"/>', 'site="s"/>', "general 'grip', which drives no joint"),
         ('<general name="grip" tendon="split"/>', '<adhesion body="a"/>', "adhesion '0', which drives no joint"),
     ],

@@ -64,7 +64,7 @@ def test_everything_that_does_not_move_the_mechanism_is_told(tmp_path: Path) -> 
     assert str(caught[0].message).split("mechanism: ")[1] == (
         "height field asset, texture, contact exclusion, 2 sensors, density and viscosity of the fluid around it, "
         "2 lights, camera, plane, height field, mocap of body 'm', which stays where it is, ellipsoid shape, "
-        "gravity compensation, 2 custom values"
+        "gravcomp of 1 bodies, which are of full weight here, 2 custom values"
     )
 
 

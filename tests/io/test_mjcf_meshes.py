@@ -191,6 +191,15 @@ def test_a_mass_from_a_mesh_that_has_none_is_refused_by_name(
     assert message in str(caught.value)
 
 
+def test_a_shape_fitted_to_a_mesh_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    """Where it is drawn: a hidden one of no mass needs no mesh."""
+    path = model(tmp_path, 'file="none.obj"', 'type="box" mesh="m" mass="0"', body='<geom size="0.1"/>')
+    with pytest.warns(LeftOutWarning, match=r"mechanism: mesh 'm', which cannot be read \(No such file"):
+        fb.load(path)
+    path.write_text(path.read_text().replace('mass="0"', 'mass="0" group="3"'))
+    assert [visual.shape for visual in fb.load(path).visuals] == ["sphere"]
+
+
 COLOURS = """<mujoco><default><material rgba="0.1 0.2 0.3 1"/><default class="red"><geom rgba="1 0 0 1"/></default>
 <default class="hidden"><geom group="3"/></default></default>
 <asset><material name="blue" rgba="0 0 1 1"/><material name="plain"/></asset><worldbody><body><joint/>
