@@ -21,7 +21,7 @@ from fivebar_pin.io._mjcf_assets import Assets
 from fivebar_pin.io._mjcf_equality import FACTOR, HINGE, Equality
 from fivebar_pin.io._mjcf_include import including
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
-from fivebar_pin.io._mjcf_sections import check_sections, gravity
+from fivebar_pin.io._mjcf_sections import check_disabled, check_sections, gravity
 from fivebar_pin.io._mjcf_springs import tendon_springs
 from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._sidecar import Sidecar
@@ -80,6 +80,12 @@ def read_mjcf(
     _stated_pose(model, bodies)
     _keyframes(reader, root, model, bodies.order)
     springs: tuple[Spring | JointSpring, ...] = (*tendon_springs(reader, root, bodies, model), *bodies.springs)
+    acting = {
+        "damper": bool(np.any(model.damping)) or any(spring.damping for spring in springs),
+        "frictionloss": bool(np.any(model.upperDryFrictionLimit)),
+        "spring": any(spring.stiffness for spring in springs),
+    }
+    check_disabled(reader, root, acting)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     try:
         chain = ClosedChain(model, found, driven, name=tree.name, visuals=visuals, springs=springs)

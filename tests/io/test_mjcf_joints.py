@@ -169,6 +169,23 @@ def test_equalities_and_their_defaults_may_be_off(tmp_path: Path) -> None:
         assert fb.load(write(tmp_path, text)).closures == ()
 
 
+@pytest.mark.parametrize("flag", ["equality", "constraint"])
+def test_equalities_that_a_flag_takes_away_are_off(tmp_path: Path, flag: str) -> None:
+    path = write(tmp_path, LINKAGE.replace("<worldbody>", f'<option><flag {flag}="disable"/></option><worldbody>'))
+    with pytest.warns(LeftOutWarning, match="connect 'loop', which is not active"):
+        assert fb.load(path).closures == ()
+
+
+def test_a_wide_range_of_a_fixed_tendon_is_a_bound_and_is_told(tmp_path: Path) -> None:
+    """The crank's limits let it go 13.96 rad."""
+    tied = '<tendon><fixed name="far" range="-0.7 {}"><joint joint="crank" coef="1"/></fixed>'
+    path = write(tmp_path, LINKAGE.replace("<tendon>", tied.format(0.7), 1))
+    with pytest.warns(LeftOutWarning, match="mechanism: range of fixed 'far'$"):
+        fb.load(path)
+    with pytest.raises(FileFormatError, match="fixed 'far': range: limits that tie bodies"):
+        fb.load(write(tmp_path, LINKAGE.replace("<tendon>", tied.format(0.69), 1)))
+
+
 def test_a_keyframe_without_an_orientation_has_the_neutral_one(tmp_path: Path) -> None:
     text = '<mujoco><worldbody><body><freejoint name="f"/><geom size="0.1"/></body></worldbody><keyframe>'
     chain = fb.load(write(tmp_path, text + '<key name="k" qpos="1 2 3 0 0 0 0"/></keyframe></mujoco>'))
