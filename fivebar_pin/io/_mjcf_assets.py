@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -46,6 +47,8 @@ class Mesh:
         """Why nothing can be read or drawn, "" where it can."""
         if self.file is None:
             return "" if self.vertices is not None else "has no file and no points"
+        if not os.path.isfile(self.file):
+            return "cannot be read (there is no such file)"
         try:
             with open(self.file, "rb") as stream:
                 start = stream.read(len(_POINTER))
@@ -109,7 +112,7 @@ class Assets:
         compiler = self.reader.compiler
         file = self.reader.path.parent / compiler.get("meshdir", compiler.get("assetdir", "")) / name
         beside = self.reader.sources.get(where, self.reader.path).parent / name
-        return beside if not file.exists() and beside.exists() else file
+        return beside if not os.path.isfile(file) and os.path.isfile(beside) else file
 
     def find(self, geom: ElementTree.Element, where: str) -> Mesh:
         """Return the mesh that a geom names."""

@@ -7,6 +7,7 @@ without a value is none.
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -93,9 +94,9 @@ class _Merging:
         if not name.strip() or len(include):
             raise FileFormatError(where, "<include> needs the attribute 'file' and has no content")
         file = self.path.parent / name
-        if not file.exists():
+        if not os.path.isfile(file):
             file = where.parent / name
-        if not file.exists():
+        if not os.path.isfile(file):
             raise FileFormatError(where, f"<include>: there is no file {name!r} in {self.path.parent} or beside it")
         if file.resolve() in {each.resolve() for each in chain}:
             way = " -> ".join(each.name for each in (*chain, file))

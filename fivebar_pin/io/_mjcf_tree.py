@@ -239,7 +239,7 @@ class BodyTree:
                     continue
                 part = geom_inertia(reader, self.assets, full, f"geom of {where}")
                 total = part if total is None else total if part is None else total + part
-        return total
+        return stated_inertia(reader, stated, where) if total is None and stated is not None else total
 
     def site(self, site: ElementTree.Element, link: str, where: str) -> None:
         name = site.get("name")

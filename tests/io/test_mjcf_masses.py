@@ -28,6 +28,7 @@ HEAVY = """<mujoco><compiler {}/><option><flag {}/></option><worldbody>
         'inertiafromgeom="true" inertiagrouprange="1 2"',
         'inertiafromgeom="true" inertiagrouprange="3 3" boundmass="0.2" boundinertia="0.01"',
         'boundmass="0.3" boundinertia="0.004"',
+        'inertiafromgeom="true" inertiagrouprange="2 2"',
         'settotalmass="7"',
         'settotalmass="7" boundmass="0.2"',
         'balanceinertia="true"',

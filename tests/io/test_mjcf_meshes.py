@@ -9,6 +9,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.errors import FileFormatError, LeftOutWarning
+from fivebar_pin.io import _mjcf_assets
 
 mujoco = pytest.importorskip("mujoco")
 from mujoco_twin import Twin  # noqa: E402
@@ -144,7 +145,8 @@ def test_a_mesh_is_drawn_at_its_place_and_size(tmp_path: Path, how: str) -> None
 @pytest.mark.parametrize(
     ("mesh", "told"),
     [
-        ('file="none.obj"', r"mesh 'm', which cannot be read \(No such file or directory\)"),
+        ('file="none.obj"', r"mesh 'm', which cannot be read \(there is no such file\)"),
+        (f'file="{"x" * 300}.obj"', r"mesh 'm', which cannot be read \(there is no such file\)"),
         ('file="pointer.stl"', "mesh 'm', which is a git-lfs pointer, not the mesh; run git lfs pull"),
         ('file="wedge.msh"', "mesh 'm', which is not drawn: of .dae, .obj, .stl files alone"),
         (INLINE, "mesh 'm', which has no file and is not drawn"),
@@ -166,10 +168,10 @@ def test_a_mesh_that_cannot_be_drawn_is_told_once(tmp_path: Path, mesh: str, tol
 @pytest.mark.parametrize(
     ("mesh", "geom", "message"),
     [
-        ('file="none.obj"', "mesh", "has its mass from mesh 'm', which cannot be read (No such file"),
+        ('file="none.obj"', "mesh", "has its mass from mesh 'm', which cannot be read (there is no such file"),
         ('file="pointer.stl"', "mesh", "which is a git-lfs pointer, not the mesh; run git lfs pull; state <inertial>"),
         ('file="junk.stl"', "mesh", "which cannot be read ("),
-        ('file="none.obj"', "box", "has its mass from mesh 'm', which cannot be read (No such file"),
+        ('file="none.obj"', "box", "has its mass from mesh 'm', which cannot be read (there is no such file"),
         ('vertex="0 0 0 1 0 0 0 1 0 0 0 1" face="0 1 2 0 3 1 0 2 3 1 3 2" inertia="exact"', "mesh", "faced inwards"),
         ('vertex="0 0 0 1 0 0 0 1 0 1 1 0"', "mesh", "has no convex hull, as its points lie in a plane"),
         ('vertex="0 0 0 1"', "mesh", "mesh 'm': vertex and face must hold three numbers for each"),
@@ -191,10 +193,20 @@ def test_a_mass_from_a_mesh_that_has_none_is_refused_by_name(
     assert message in str(caught.value)
 
 
+def test_a_mesh_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def closed(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(_mjcf_assets, "open", closed, raising=False)
+    path = model(tmp_path, f'file="{obj(tmp_path).name}"', 'type="mesh" mesh="m" mass="0"', body='<geom size="0.1"/>')
+    with pytest.warns(LeftOutWarning, match=r"mesh 'm', which cannot be read \(Permission denied\)"):
+        fb.load(path)
+
+
 def test_a_shape_fitted_to_a_mesh_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     """Where it is drawn: a hidden one of no mass needs no mesh."""
     path = model(tmp_path, 'file="none.obj"', 'type="box" mesh="m" mass="0"', body='<geom size="0.1"/>')
-    with pytest.warns(LeftOutWarning, match=r"mechanism: mesh 'm', which cannot be read \(No such file"):
+    with pytest.warns(LeftOutWarning, match=r"mechanism: mesh 'm', which cannot be read \(there is no such file"):
         fb.load(path)
     path.write_text(path.read_text().replace('mass="0"', 'mass="0" group="3"'))
     assert [visual.shape for visual in fb.load(path).visuals] == ["sphere"]
