@@ -41,9 +41,9 @@ def load(
     """Load a closed chain.
 
     Args:
-        path: a folder with one URDF (and its sidecar) or one MJCF file; a .urdf file whose sidecar lies beside it
-            under the same name (.yaml or .yml), or as the folder's only sidecar; an MJCF .xml file; or the name of a
-            mechanism that ships (`shipped`), where no file or folder is called so.
+        path: a folder with one URDF (and its sidecar) or one MJCF mechanism beside its scenes; a .urdf file whose
+            sidecar lies beside it under the same name (.yaml or .yml), or as the folder's only sidecar; an MJCF .xml
+            file; or the name of a mechanism that ships (`shipped`), where no file or folder is called so.
         free_flyer: put the root of a URDF on a free-flying base.
         closures: use these instead of the file's closures, among them the couplings that <mimic> states in a URDF;
             with `actuated`, no sidecar is needed.
@@ -52,7 +52,10 @@ def load(
         max_bytes: size above which a URDF or MJCF file is not read.
 
     Returns:
-        The chain; meshes are named in its visuals but not read.
+        The chain; meshes are named in its visuals, and read where an MJCF file takes a mass from them.
+
+    Warns:
+        LeftOutWarning: the file states things that the chain goes without; names them in one line.
 
     Raises:
         FileFormatError: a file is missing, malformed or states something impossible; names file, element, way out.

@@ -91,7 +91,7 @@ class Assets:
         if points.size % 3 or corners.size % 3:
             raise reader.fail(where, "vertex and face must hold three numbers for each point and triangle")
         if np.any(corners < 0) or np.any(corners >= points.size // 3) or np.any(corners % 1.0):
-            raise reader.fail(where, f"face names points outside 0 to {points.size // 3 - 1}")
+            raise reader.fail(where, f"face must name points by whole numbers from 0 to {points.size // 3 - 1}")
         return Mesh(
             self.file(element, where),
             np.array(reader.numbers(element, "scale", 3, where, [1.0, 1.0, 1.0])),

@@ -123,7 +123,7 @@ TENDONS = """<mujoco><default><tendon stiffness="7"/><motor armature="0.1"/></de
 <fixed><joint joint="ja" coef="-2"/></fixed><fixed stiffness="0" actuatorfrcrange="-1 1" name="u">
 <joint joint="jb" coef="4"/></fixed></tendon>
 <actuator><motor tendon="t" gear="3" forcerange="-1 2"/><motor tendon="t" gear="-1" forcerange="-1 2"/>
-<motor tendon="u" damping="0.2" ctrlrange="-1 1" armature="0"/></actuator></mujoco>"""
+<motor tendon="u" damping="0.2" ctrlrange="-1 1" forcerange="-0.5 3" armature="0"/></actuator></mujoco>"""
 
 
 def test_fixed_tendons_of_one_joint_are_its_springs_and_their_motors_its_own(tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_fixed_tendons_of_one_joint_are_its_springs_and_their_motors_its_own(tmp
     assert automatic == JointSpring("ja", 28.0, np.deg2rad(30.0))
     np.testing.assert_allclose(chain.model.armature, [0.1 * (1.5**2 + 0.5**2), 0.0], rtol=1e-15)
     np.testing.assert_allclose(chain.model.damping, [0.0, 0.2 * 16.0], rtol=1e-15)
-    np.testing.assert_array_equal(chain.model.lowerEffortLimit, [-1.0, -4.0])
+    np.testing.assert_array_equal(chain.model.lowerEffortLimit, [-1.0, -2.0])
     np.testing.assert_array_equal(chain.model.upperEffortLimit, [3.5, 4.0])
 
 
