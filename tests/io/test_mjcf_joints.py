@@ -141,6 +141,18 @@ def test_fixed_tendons_of_one_joint_are_its_springs_and_their_motors_its_own(tmp
     np.testing.assert_array_equal(chain.model.upperEffortLimit, [3.5, 4.0])
 
 
+TIMED = """<mujoco><worldbody><body name="a"><joint name="ja" axis="0 1 0" springdamper="0.2 0.7" armature="0.1"
+ref="20" damping="3"/>{}<body name="b" pos="0.5 0 0"><joint name="jb" axis="0 1 0" springdamper="0.5 1.7" stiffness="9"
+springref="5"/><geom size="0.1" pos="0 0.1 0.3"/></body></body></worldbody></mujoco>"""
+
+
+def test_springs_stated_by_their_time_are_those_of_mujoco(tmp_path: Path) -> None:
+    Twin(write(tmp_path, TIMED.format('<geom size="0.1" pos="0.3 0 0"/>'))).assert_same()
+    bare = TIMED.format("").replace('<geom size="0.1" pos="0 0.1 0.3"/>', "")
+    with pytest.raises(FileFormatError, match="joint 'ja': springdamper needs bodies of mass; state stiffness"):
+        fb.load(write(tmp_path, bare))
+
+
 SPLIT = """<mujoco><worldbody><body name="a"><joint name="ja"/><geom size="0.1"/></body>
 <body name="b"><joint name="jb"/><geom size="0.1"/></body><body name="c"><joint name="jc"/><geom size="0.1"/></body>
 <body name="d"><joint name="jd" type="ball"/><geom size="0.1"/></body><site name="s"/></worldbody>
