@@ -77,6 +77,12 @@ def test_ref_limits_keyframes_and_springs_are_in_the_same_coordinate(tmp_path: P
     assert chain.springs == (JointSpring("crank", 3.0, np.deg2rad(25.0)), JointSpring("slide", 5.0, 0.0))
 
 
+def test_hinges_of_two_coordinates_are_neutral_in_the_stated_pose(tmp_path: Path) -> None:
+    text = '<mujoco><worldbody><body><joint name="ja" ref="90"/><joint name="jb"/><geom size="0.1"/></body></worldbody>'
+    chain = fb.load(write(tmp_path, text + '<custom><numeric name="unbounded jb" data="1"/></custom></mujoco>'))
+    np.testing.assert_array_equal(chain.references["qpos0"], [np.pi / 2.0, 1.0, 0.0])
+
+
 @pytest.mark.parametrize("formats", [("mjcf",), ("urdf",)])
 def test_what_was_read_comes_back_from_a_saved_file(tmp_path: Path, formats: tuple[str, ...]) -> None:
     twin = Twin(write(tmp_path, LINKAGE))
@@ -100,11 +106,11 @@ FRAMES = """<mujoco><default><default class="x"><geom size="0.2"/>
 <joint armature="0.3"/></default><default class="y"><geom size="0.4"/></default></default><worldbody>
 <frame pos="0.1 0.2 0.3" euler="10 20 30" childclass="x"><frame euler="0 0 40">
 <body name="a" pos="1 0 0" euler="5 0 0"><frame pos="0.1 0 0.2" euler="0 60 0">
-<joint name="ja" axis="1 2 3" pos="0 0.1 0"/><geom/><site name="tip" pos="0.3 0 0"/><geom class="y"/></frame>
+<joint name="ja" axis="1 2 3" pos="0 0.1 0"/><geom/><site name="tip" pos="0.3 0 0"/></frame>
 <geom type="capsule" size="0.1" fromto="0 0 0 1 1 1"/>
 <frame pos="0 0 0.1" euler="0 0 20"><inertial mass="2" pos="0.1 0 0" diaginertia="0.1 0.2 0.25"/></frame>
 <frame zaxis="1 1 0"><body name="b"><joint name="jb" axis="0 1 0"/>
-<frame zaxis="1 0 0"><geom type="capsule" size="0.1" fromto="0 0 0 1 1 1"/></frame></body></frame></body></frame>
+<frame><geom class="y"/></frame><frame zaxis="1 0 0"><geom type="capsule" size="0.1" fromto="0 0 0 1 1 1"/></frame></body></frame></body></frame>
 </frame></worldbody><equality><connect site1="tip" site2="tip2"/></equality></mujoco>""".replace(
     "<worldbody>", '<worldbody><site name="tip2" pos="1 2 3"/>'
 )
