@@ -110,7 +110,8 @@ FRAMES = """<mujoco><default><default class="x"><geom size="0.2"/>
 <geom type="capsule" size="0.1" fromto="0 0 0 1 1 1"/>
 <frame pos="0 0 0.1" euler="0 0 20"><inertial mass="2" pos="0.1 0 0" diaginertia="0.1 0.2 0.25"/></frame>
 <frame zaxis="1 1 0"><body name="b"><joint name="jb" axis="0 1 0"/>
-<frame><geom class="y"/></frame><frame zaxis="1 0 0"><geom type="capsule" size="0.1" fromto="0 0 0 1 1 1"/></frame></body></frame></body></frame>
+<frame childclass="x"><geom class="y"/></frame>
+<frame zaxis="1 0 0"><geom type="capsule" size="0.1" fromto="0 0 0 1 1 1"/></frame></body></frame></body></frame>
 </frame></worldbody><equality><connect site1="tip" site2="tip2"/></equality></mujoco>""".replace(
     "<worldbody>", '<worldbody><site name="tip2" pos="1 2 3"/>'
 )
