@@ -54,7 +54,8 @@ AXIS, WAY, CENTRE, MOTION, PITCH, OWNER, QS, QS_KIND = range(8)
 COLUMN_SIZE = 8
 TURN, SHIFT, HELIX = range(3)
 
-# Fields of a closure and of its entries, the columns that move it.
+# Fields of a closure and of its entries, the columns that move it. TIES: 0 between frames, 1 of coordinates, 2 of
+# their velocities alone.
 POSE1, POSE2, RATE1, RATE2, FRAMES, ROW0, ROW0_END, ENTRY0, ENTRY0_END, TIES = range(10)
 CLOSURE_SIZE = 10
 COLUMN, SIGN, LOCAL, ENTRY_AXIS, ENTRY_WAY, ENTRY_CENTRE, ENTRY_MOTION, ENTRY_PITCH, RATIO = range(9)
@@ -63,7 +64,7 @@ ENTRY_SIZE = 9  # LOCAL: place in its block, or -1
 # Fields of a row.
 SORT, DIRECTION, RESIDUAL, LEAD, WRENCH, JACOBIAN0, ENTRIES, ENTRIES_END, CLOSURE = range(9)
 ROW_SIZE = 9
-ALONG, TILT, TURNED, LENGTH, RATIOS = range(5)
+ALONG, TILT, TURNED, LENGTH, SPIN, RATIOS = range(6)
 
 # Fields of a block: its rows (places of their records), its columns (velocity coordinates), its motors; RAW rows are
 # mixed to HEIGHT ones where MIX is a place.

@@ -16,6 +16,7 @@ from fivebar_pin.chain import find_frame
 from fivebar_pin.chain.masses import turned
 from fivebar_pin.closures.anchored import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
+from fivebar_pin.closures.rest import AnchoredStill
 from fivebar_pin.closures.rows import Row
 from fivebar_pin.engine import tables as e
 from fivebar_pin.mechanism.dimensions import Dimensions, dimensions_of
@@ -24,7 +25,7 @@ from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["SORTS", "Block", "Parts", "blocks_of", "constants_of", "joined_rows", "layout_of"]
 
-SORTS = {"along": e.ALONG, "tilt": e.TILT, "turned": e.TURNED, "length": e.LENGTH}
+SORTS = {"along": e.ALONG, "tilt": e.TILT, "turned": e.TURNED, "length": e.LENGTH, "spin": e.SPIN}
 """Sorts of rows between frames, by their word."""
 _TOGETHER = 1e-12  # distance of a spring's ends that is round-off: they lie on one point [chain lengths]
 
@@ -456,7 +457,7 @@ class _Layout:
                     e.POSE1: memory["pose"][i], e.POSE2: memory["pose"][j], e.RATE1: memory["rate"][i],
                     e.RATE2: memory["rate"][j], e.FRAMES: constants["frames"][n], e.ROW0: start,
                     e.ROW0_END: start + e.ROW_SIZE * count, e.ENTRY0: entries[n], e.ENTRY0_END: end,
-                    e.TIES: not between,
+                    e.TIES: 0 if between else 2 if isinstance(anchored, AnchoredStill) else 1,
                 },
             )  # fmt: skip
             for row in range(count):

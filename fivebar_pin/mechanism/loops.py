@@ -179,9 +179,14 @@ class Loops:
         k = int(np.argmax(sizes))
         return self.anchored[k].closure.name, sizes[k]
 
+    @property
+    def lacking(self) -> int:
+        """Number of passive coordinates for which there is no row."""
+        return int(self.passive.size - sum(min(g.reduce.shape[0], g.passive.size) for g in self._groups))
+
     def require_determined(self) -> None:
         """Raise unless the actuated joints can determine the motion."""
-        lacking = self.passive.size - sum(min(g.reduce.shape[0], g.passive.size) for g in self._groups)
+        lacking = self.lacking
         if lacking:
             raise InvalidInputError(
                 "actuated joints",
