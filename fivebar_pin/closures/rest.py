@@ -67,7 +67,7 @@ class Still(Closure):
     joined: ClassVar[int | None] = 1
 
     def __post_init__(self) -> None:
-        self._settle()
+        self._settle()  # named after the joint
 
     @property
     def joins(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from fivebar_pin.diagnosis.findings import (
     GIVEN,
     STILL,
     about_actuation,
+    about_idle,
     about_inertia,
     about_mobility,
     about_parts,
@@ -28,6 +29,7 @@ from fivebar_pin.mechanism import mobility
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
 from fivebar_pin.mechanism.complement import rates_of
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest, idle_freedoms
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
@@ -56,6 +58,9 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         InvalidInputError: q of the wrong shape or not finite.
     """
     integer("seed", seed)
+    bare, chain = chain, at_rest(chain)
+    rests = len(chain.closures) - len(bare.closures)
+    idle = idle_freedoms(bare) if rests else ()
     loops = loops_of(chain)
     findings: list[Finding] = []
     start, gap = _start(chain, q, seed, findings)
@@ -64,9 +69,9 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     if q is None and here.rank < generic.rank:
         findings.append(Finding("warning", jump(chain, here, generic, "the configuration nearest to the neutral one")))
         here, gap = generic, float(generic.gap[0])
-    determinate = _determinate(chain, here.q[0])
+    determinate = _determinate(bare, here.q[0])
     if q is None and here is not generic:
-        usual = _determinate(chain, generic.q[0])
+        usual = _determinate(bare, generic.q[0])
         if any(np.any(there & ~then) for there, then in zip(determinate, usual, strict=True)):
             # The neutral configuration lies flat: rows that share a load elsewhere have none to share there.
             here, gap, determinate = generic, float(generic.gap[0]), usual
@@ -76,21 +81,23 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
     apart = _roads_apart(chain, here) if actuation is Actuation.EXACT and sigma >= SINGULAR else None
     findings += about_roads(apart)
+    findings += about_idle(idle)
     findings += about_mobility(chain, here, generic, redundant)
     findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
     findings += about_singularity(chain, here, generic, actuation, sigma)
-    findings += about_parts(chain, here, generic)
+    findings += about_parts(chain, here, generic, idle)
     findings += about_inertia(chain, generic)
     return Diagnosis(
         name=chain.name,
         q=frozen(here.q[0]),
         gap=gap,
-        rows=loops.m,
-        rank=here.rank,
-        generic_rank=generic.rank,
+        rows=loops.m - rests,
+        rank=here.rank - rests,
+        generic_rank=generic.rank - rests,
         mobility=chain.nv - here.rank,
         generic_mobility=chain.nv - generic.rank,
-        singular_values=frozen(singular_values(loops.scaled(here.J[0]))),
+        idle=idle,
+        singular_values=frozen(singular_values(loops.scaled(here.J[0])[: loops.m - rests])),
         redundant=redundant,
         actuated=chain.actuated,
         actuation=actuation,
@@ -104,10 +111,10 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         determinate_closures=determinate[1],
         determinate_rows=tuple(
             tuple(name for name, yes in zip(c.closure.row_names, determinate[2][c.rows], strict=True) if yes)
-            for c in loops.anchored
+            for c in loops_of(bare).anchored
         ),
         joints=chain.joints,
-        closures=tuple(c.name for c in chain.closures),
+        closures=tuple(c.name for c in bare.closures),
         springs=tuple(s.name for s in chain.springs),
         problems=tuple(sorted(findings, key=lambda f: _ORDER.index(f.severity))),
     )

@@ -14,6 +14,7 @@ from fivebar_pin.errors import AssemblyError, SingularityError
 from fivebar_pin.kinematics.follow import blocked, require_near
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, most_open, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 
@@ -64,6 +65,7 @@ def assemble(
         AssemblyError: the loops do not close; names the closure that stays open and by how much.
         SingularityError: the way from `near` is blocked by a singularity.
     """
+    chain = at_rest(chain)
     checked_search(chain, starts, seed, tolerance)
     x = numeric("q_actuated", q_actuated)
     if x.ndim == 2:

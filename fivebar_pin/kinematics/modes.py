@@ -9,6 +9,7 @@ from fivebar_pin._arrays import Array, checked, finite
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.kinematics.assemble import checked_search, closed_from_starts
 from fivebar_pin.mechanism.closing import CLOSED
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import Loops
 from fivebar_pin.mechanism.tree import Poses
 
@@ -34,6 +35,7 @@ def assembly_modes(
     Returns:
         Configurations (k, nq), ordered by their coordinates; a five-bar has two. Empty when nothing closes.
     """
+    chain = at_rest(chain)
     loops = checked_search(chain, starts, seed, tolerance)
     x = checked("q_actuated", q_actuated, (chain.na,))
     q, _ = closed_from_starts(chain, loops, x, starts, seed, tolerance)

@@ -62,13 +62,25 @@ class Idle(Immutable):
     bodies: tuple[str, ...]
     rest: tuple[Closure, ...]
 
+    def __str__(self) -> str:
+        names = " and ".join((", ".join(self.bodies[:-1]), self.bodies[-1])) if len(self.bodies) > 1 else self.bodies[0]
+        alone = len(self.bodies) == 1
+        return {
+            Kind.SPIN: f"{names} may spin about {'its own axis' if alone else 'one axis together'}",
+            Kind.SLIDE: f"{names} may slide{'' if alone else ' together'}",
+            Kind.LOOSE: f"no closure and no motor touches {self.joint}",
+            Kind.BASE: f"the base floats on {self.joint}",
+            Kind.PROP: f"no closure and no motor touches the free body {names}",
+        }[self.kind]
+
 
 def at_rest(chain: ClosedChain) -> ClosedChain:
-    """Return the chain with what holds its idle freedoms at rest, itself where it has none or drives nothing.
+    """Return the chain with what holds its idle freedoms at rest, itself where it has none.
 
-    Columns, frames and joints are those of the chain; frames and closures may follow behind its own.
+    Columns, frames and joints are those of the chain; frames and closures may follow behind its own. Where there are
+    no motors, a loose joint or a floating base is not held: nothing tells it from any other.
     """
-    held = _held(chain) if chain.na else None
+    held = _held(chain)
     return chain if held is None else held
 
 
@@ -76,13 +88,15 @@ def at_rest(chain: ClosedChain) -> ClosedChain:
 def _held(chain: ClosedChain) -> ClosedChain | None:
     if not loops_of(chain).lacking:
         return None
-    rests = [rest for idle in idle_freedoms(chain) for rest in idle.rest]
+    held = [x for x in idle_freedoms(chain) if chain.na or x.kind not in (Kind.LOOSE, Kind.BASE)]
+    rests = [rest for idle in held for rest in idle.rest]
     return _with(chain, rests) if rests else None
 
 
 def _with(chain: ClosedChain, rests: Sequence[Closure]) -> ClosedChain:
     """Return a chain with further rows, and with the frames that they are between."""
     model = chain.model.copy()
+    rests = [replace(rest, name=f"{rest.name} at rest ({k})") for k, rest in enumerate(rests)]
     for rest in rests:
         if isinstance(rest, Spin):
             j = int(rest.frames[1].removeprefix(_REST))
@@ -128,8 +142,6 @@ def _untouched(chain: ClosedChain, loops: Loops, touched: npt.NDArray[np.bool_])
         kind = Kind.LOOSE
         if floats:
             kind = Kind.BASE if any(touched[k] for k in own) else Kind.PROP
-        if kind is Kind.LOOSE and not (chain.na or chain.closures):
-            continue  # an open tree without motors: everything is
         rest = tuple(Still(str(model.names[j]), k - int(columns[0])) for k in loose)
         yield Idle(kind, str(model.names[j]), tuple(_name(model, i) for i in below), rest)
 
@@ -140,7 +152,7 @@ class _Search:
     def __init__(self, chain: ClosedChain, loops: Loops, site: Configurations, mine: npt.NDArray[np.bool_]) -> None:
         self._chain, self._loops, self._mine = chain, loops, mine
         self._J = loops.scaled(site.J[0])
-        self._S, self._R = site.poses.S[0], site.poses.R[:, 0]
+        self._S, self._R, self._p = site.poses.S[0], site.poses.R[:, 0], site.poses.p[:, 0]
         self._clusters = self._about_one_point()
         self._known = np.zeros((chain.nv, 0))
 
@@ -160,9 +172,17 @@ class _Search:
         for j in range(1, model.njoints):
             parent = int(model.parents[j])
             apart = float(np.linalg.norm(model.jointPlacements[j].translation))
-            joined = parent in clusters and children[parent] == 1 and apart <= _ONE_POINT * self._chain.length
+            near = children[parent] == 1 and apart <= _ONE_POINT * self._chain.length
+            joined = parent in clusters and near and self._turns(j) and self._turns(parent)
             clusters[j] = [*clusters.pop(parent), j] if joined else [j]
         return list(clusters.values())
+
+    def _turns(self, j: int) -> bool:
+        """Tell whether a joint does nothing but turn about its origin."""
+        model = self._chain.model
+        S = self._S[:, model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
+        slides = S[:3] - np.cross(self._p[j], S[3:], axisb=0, axisc=0)
+        return bool(np.abs(slides).max(initial=0.0) <= _ONE_POINT * self._chain.length)
 
     def _columns(self, cluster: Sequence[int] | None) -> list[int]:
         model = self._chain.model
@@ -206,7 +226,7 @@ class _Search:
         if np.abs(omega).max() > _VANISHING:
             axis = self._R[top].T @ omega / np.linalg.norm(omega)
             frames = f"{_REST}beside {int(model.parents[one[0]])}", f"{_REST}{top}"
-            return Idle(Kind.SPIN, str(model.names[top]), names, (Spin(frames, axis, name=f"{names[0]} at rest"),))
+            return Idle(Kind.SPIN, str(model.names[top]), names, (Spin(frames, axis, name=names[0]),))
         k = int(np.argmax(np.abs(z)))
         j = next(j for j in (*one, *(two or ())) if model.idx_vs[j] <= k < model.idx_vs[j] + model.nvs[j])
         return Idle(Kind.SLIDE, str(model.names[j]), names, (Still(str(model.names[j]), k - int(model.idx_vs[j])),))
