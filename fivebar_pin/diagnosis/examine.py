@@ -80,17 +80,20 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     redundant = _redundant_rows(loops, here, generic)
     sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
     apart = _roads_apart(chain, here) if actuation is Actuation.EXACT and sigma >= SINGULAR else None
-    findings += about_roads(apart)
-    findings += about_idle(idle)
-    findings += about_mobility(chain, here, generic, redundant)
-    findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
-    findings += about_singularity(chain, here, generic, actuation, sigma)
-    findings += about_parts(chain, here, generic, idle)
-    findings += about_inertia(chain, generic)
+    closed = _is_closed(loops, start)
+    if closed:
+        findings += about_roads(apart)
+        findings += about_idle(idle)
+        findings += about_mobility(chain, here, generic, redundant)
+        findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
+        findings += about_singularity(chain, here, generic, actuation, sigma)
+        findings += about_parts(chain, here, generic, idle)
+    findings += about_inertia(chain, generic, closed)
     return Diagnosis(
         name=chain.name,
         q=frozen(here.q[0]),
         gap=gap,
+        closed=closed,
         rows=loops.m - rests,
         rank=here.rank - rests,
         generic_rank=generic.rank - rests,
@@ -133,7 +136,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
     else:
         asked = checked("q", q, (chain.nq,))
         asked = np.array(pin.normalize(chain.model, asked))
-        found = mobility.close_all(chain, asked[None], CLOSED)[0][0]
+        found = mobility.closed_from(chain, asked, CLOSED)
         opened, gap = (float(mobility.gap(loops, x[None])[0]) for x in (found, asked))
         if not _is_closed(loops, asked):
             name, size = loops.worst(residual_of(loops, asked[None])[0])

@@ -175,11 +175,14 @@ def about_parts(
         yield Finding("warning", f"the configuration is outside the limits of {names}")
 
 
-def about_inertia(chain: ClosedChain, site: Configurations) -> Iterator[Finding]:
-    """Find bodies that cannot be, and motions without inertia."""
+def about_inertia(chain: ClosedChain, site: Configurations, closed: bool) -> Iterator[Finding]:
+    """Find bodies that cannot be, that have no mass and, where the loops are closed, motions without inertia."""
     for severity, text in inertias.inertia_problems(chain, inertias.normals(chain, site)):
         yield Finding("warning" if severity == "warning" else "error", text)
-    text = inertias.mass_problem(chain, site)
+    massless = inertias.massless_bodies(chain)
+    if massless:
+        yield Finding("note", f"without mass: {', '.join(massless)}")
+    text = inertias.mass_problem(chain, site) if closed else ""
     if text:
         yield Finding("error", text)
 

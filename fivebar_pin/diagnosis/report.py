@@ -99,6 +99,8 @@ class Diagnosis(Immutable):
         name: of the mechanism.
         q: closed configuration the diagnosis holds for (nq,).
         gap: largest closure residual at the configuration that was asked for, else at q [m or rad].
+        closed: whether the loops are closed at q. Where no configuration closes them, q is the nearest one found, and
+            what is said of it (rank, mobility, actuation and so on) is not true of the mechanism.
         rows: number of closure rows.
         rank, generic_rank: rank of the closures here and at almost every closed configuration nearby.
         mobility, generic_mobility: degrees of freedom here and in general.
@@ -129,6 +131,7 @@ class Diagnosis(Immutable):
     name: str
     q: Array
     gap: float
+    closed: bool
     rows: int
     rank: int
     generic_rank: int
@@ -189,6 +192,14 @@ def _lines(d: Diagnosis) -> Iterator[str]:
     changes, general = "", ""
     if d.is_singular:
         changes, general = f" here, {d.generic_mobility} in general (singular)", f" here, {d.generic_rank} in general"
+    if not d.closed:
+        yield _entry("open by", f"{d.gap:.2g} m or rad at best; mobility and actuation are those of closed loops only")
+        yield _entry("closures", f"{', '.join(d.closures)}: {d.rows} rows")
+        yield _entry("actuated", ", ".join(d.actuated) or "none")
+        yield "  findings"
+        for problem in d.problems:
+            yield f"    {problem}"
+        return
     held = sum(len(x.rest) for x in d.idle)
     yield _entry("mobility", f"{d.mobility}{changes}{f', and {held} held at rest' if held else ''}")
     yield _entry("closures", f"{', '.join(d.closures) or 'none'}: {d.rows} rows, rank {d.rank}{general}")

@@ -14,13 +14,14 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import TINY, Array, block_svd
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate, search
+from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate, nudged, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import ranks_of, singular_values, truncated_inverse
 
 __all__ = [
     "close_all",
+    "closed_from",
     "determining_sets",
     "first_closed",
     "gap",
@@ -114,6 +115,17 @@ def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array
     return q[k], float(gap(loops, q[k : k + 1])[0])
 
 
+def closed_from(chain: ClosedChain, q: Array, tolerance: float) -> Array:
+    """Close the loops from q (nq,), or from places about it where a search that starts there stays; the best found."""
+    loops = loops_of(chain)
+    found, sizes = close_all(chain, q[None], tolerance)
+    if not closed_enough(loops, sizes, tolerance)[0]:
+        more, further = close_all(chain, nudged(loops, q[None]), tolerance)
+        found, sizes = np.concatenate([found, more]), np.concatenate([sizes, further])
+    closed = np.flatnonzero(closed_enough(loops, sizes, tolerance))
+    return np.asarray(found[int(closed[0] if closed.size else np.argmin(sizes))])
+
+
 def _best(chain: ClosedChain, loops: Loops, q: Array, sizes: Array, tolerance: float) -> int | None:
     """Return the first of configurations q (n, nq) that is closed and within the limits."""
     low, high = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
@@ -130,7 +142,7 @@ def _within_limits(chain: ClosedChain, q: Array, rng: np.random.Generator) -> Ar
     for k in (int(chain.model.idx_qs[j]) for j in single):
         outside = (out[:, k] < low[k]) | (out[:, k] > high[k])
         if outside.any():
-            narrow = -_WIDE < low[k] and high[k] < _WIDE
+            narrow = low[k] > -_WIDE and high[k] < _WIDE
             drawn = rng.uniform(low[k], high[k], len(q)) if narrow else np.clip(out[:, k], low[k], high[k])
             out[outside, k] = drawn[outside]
     return out

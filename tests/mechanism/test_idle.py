@@ -237,3 +237,17 @@ def test_a_rod_spins_beside_a_motor_too_few_and_is_found_without_motors():
         chain = chain.with_actuated(() if not actuated else ("one",))
         assert [x.kind for x in idle_freedoms(chain)] == [Kind.SPIN]
     assert fb.diagnose(chain.with_actuated(())).generic_mobility == 1
+
+
+def test_a_simulation_tells_the_torques_of_what_spins_freely_and_of_a_floating_base():
+    chain, q = floating_rod()
+    path = fb.simulate(chain, q, np.zeros(chain.nv), [0.4], np.linspace(0.0, 0.2, 5))
+    np.testing.assert_allclose(fb.inverse_dynamics(chain, path).torque, 0.4, rtol=0.0, atol=1e-6)
+    model = pin.Model()
+    root = add(model, 0, pin.JointModelFreeFlyer(), at(), "root", body(9))
+    add(model, root, pin.JointModelRZ(), at(0.3), "arm", body(1))
+    base = fb.ClosedChain(model, (), ("arm",))
+    path = fb.simulate(base, pin.neutral(model), np.zeros(7), [0.4], np.linspace(0.0, 0.2, 5))
+    loads = fb.inverse_dynamics(base, path)
+    np.testing.assert_allclose(loads.torque, 0.4, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(loads.frame_force, 0.0, rtol=0.0, atol=1e-6)
