@@ -39,7 +39,7 @@ def run(chosen: argparse.Namespace) -> int:
         if os.path.lexists(file):
             check_new(file, overwrite=chosen.overwrite)
     chain = load_any(chosen.path, chosen.gravity)
-    trajectory = motion_along(chain, chosen.motion)
+    trajectory = motion_along(chain, chosen.motion, stand=True)
     shown = [viz.Shown(chain, trajectory, inverse_dynamics(chain, trajectory) if len(trajectory) > 1 else None)]
     if chosen.html is not None:
         page = viz.html(chosen.html, shown, speed=chosen.speed, overwrite=chosen.overwrite)

@@ -184,9 +184,14 @@ def closed_from_starts(
         return q[:1], np.zeros(0)
     found = search(loops, q)
     closed = polish(loops, found)
-    good = closed_enough(loops, closed.residual, tolerance)
-    good &= ~loops.opposed(loops.see(closed.q))
-    return closed.q[good], _smallest(residual_of(loops, found))
+    lost = ~np.isfinite(closed.residual)  # by Newton's method, where loops are folded
+    q, sizes = (
+        np.where(lost[:, None], found, closed.q),
+        np.where(lost, Configurations(loops, found).gap, closed.residual),
+    )
+    good = closed_enough(loops, sizes, tolerance)
+    good &= ~loops.opposed(loops.see(q))
+    return q[good], _smallest(residual_of(loops, found))
 
 
 def _counted(chain: ClosedChain) -> list[int]:

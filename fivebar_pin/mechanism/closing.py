@@ -47,7 +47,7 @@ _BLOCK = 4096  # samples polished at a time, so that what is computed on the way
 _POLISHED = 1e-9  # scaled residual below which one more Newton step reaches round-off: it squares it [-]
 _ASTRAY = 1e3  # sum of Newton steps beyond which a sample is given up [rad, or chain lengths]
 
-_CONTENT = 1e-20  # half the squared scaled residual that a search is content with: 1e-10, for `polish` to end [-]
+_CONTENT = 1e-26  # half the squared scaled residual that a search is content with, also where loops are folded [-]
 _FLAT = 1e-14  # gradient of it below which the search stands at a stationary point [-]
 _DAMPING = 1e-3  # of the first step, as part of the mean slope [-]
 _LEAST_DAMPING, _MOST_DAMPING, _STUCK = 1e-12, 1e8, 1e7  # bounds, and from where on steps lead nowhere [-]

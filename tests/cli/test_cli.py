@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanisms import five_bar
 
 import fivebar_pin as fb
 from fivebar_pin.cli import main
@@ -273,3 +274,14 @@ def test_what_is_balanced_reads_as_zero_and_is_written_with_every_digit(
     assert "as it is: 0 kg" in capsys.readouterr().out
     assert main(["loads", "five_bar_case_I"]) == 0
     assert "frame force" not in capsys.readouterr().out  # no weight, nothing to tell apart
+
+
+@pytest.mark.parametrize("actuated", [(), ("left", "right", "left_elbow", "right_elbow")])
+def test_view_shows_a_mechanism_standing_whose_motors_do_not_tell_how_it_moves(tmp_path, actuated) -> None:
+    """No motors, or one in every joint, so that no joint is passive."""
+    chain = five_bar().with_actuated(actuated)
+    file = tmp_path / "chain.urdf"
+    fb.save(chain, file)
+    page = tmp_path / "page.html"
+    assert main(["view", str(file), "--html", str(page)]) == 0
+    assert page.stat().st_size > 10_000
