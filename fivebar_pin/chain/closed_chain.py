@@ -25,6 +25,8 @@ from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["ClosedChain"]
 
+_FLOATING = 6  # degrees of freedom of a joint that holds nothing
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedChain(Immutable):
@@ -207,6 +209,23 @@ class ClosedChain(Immutable):
         model = self.model.copy()
         model.gravity.linear = np.array(checked("gravity", gravity, (3,)))
         return replace(self, model=model)
+
+    def with_fixed_base(self, q: npt.ArrayLike | None = None) -> ClosedChain:
+        """Return the same mechanism with what floats on the ground held where it stands.
+
+        Args:
+            q: configuration (nq,) that tells where; the first of `references` unless given, else the neutral one.
+
+        Raises:
+            InvalidInputError: nothing floats, or q of the wrong shape.
+        """
+        model = self.model
+        floating = [j for j in range(1, model.njoints) if not model.parents[j] and model.nvs[j] == _FLOATING]
+        if not floating:
+            raise InvalidInputError("base", "fixed", "does not float: no joint of six degrees of freedom on the ground")
+        stands = next(iter(self.references.values()), pin.neutral(model)) if q is None else q
+        fixed = pin.buildReducedModel(model, floating, np.array(checked("q", stands, (self.nq,))))
+        return replace(self, model=fixed)
 
     def with_actuated(self, actuated: Iterable[str]) -> ClosedChain:
         """Return the same mechanism driven at other joints."""
