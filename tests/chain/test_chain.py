@@ -318,5 +318,5 @@ def test_a_floating_base_is_fixed_where_it_stands():
     np.testing.assert_allclose(one.shaking_force, two.shaking_force, rtol=0.0, atol=1e-11)
     neutral = chain.with_fixed_base(pin.neutral(chain.model))
     np.testing.assert_allclose(neutral.model.jointPlacements[2].translation, [1.2, 0.0, 0.0], rtol=0.0, atol=1e-15)
-    with pytest.raises(InvalidInputError, match="base = 'fixed' does not float"):
+    with pytest.raises(InvalidInputError, match="base = 'fixed' but does not float"):
         fixed.with_fixed_base()
