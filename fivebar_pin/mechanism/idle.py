@@ -4,7 +4,8 @@ They say nothing of how a mechanism moves, but leave its motion undetermined. A 
 closures of the chain stand rows of velocities alone, see `closures.rest`. Nothing holds them in a simulation.
 
 A freedom of that kind lives in the coordinates of the one or two joints (hinges about one point count as one) at which
-what moves hangs on the rest: it is looked for there, at a generic closed configuration.
+what moves hangs on the rest, on one branch of the tree or on two: it is looked for there, at a generic closed
+configuration.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -155,15 +157,20 @@ class _Search:
         self._S, self._R, self._p = site.poses.S[0], site.poses.R[:, 0], site.poses.p[:, 0]
         self._clusters = self._about_one_point()
         self._known = np.zeros((chain.nv, 0))
+        self._felt = np.array([np.isin(np.arange(chain.nv), c.columns) for c in loops.anchored])
+        held = mobility.with_held(site.J[0], loops.actuated)
+        self._most = int(mine.sum()) - loops.rank(held)
 
     def found(self) -> Iterator[Idle]:
-        """Yield them: first those in the coordinates of one joint, then of two on the same branch."""
+        """Yield them: first those in the coordinates of one joint, then of two that a closure has in common."""
         for one in self._clusters:
             yield from self._within(one, None)
-        for one in self._clusters:
-            for two in self._clusters:
-                if one[-1] != two[-1] and one[-1] in list(self._chain.model.supports[two[0]]):
-                    yield from self._within(one, two)
+        felt = [set(np.flatnonzero(self._felt[:, self._columns(x)].any(axis=1))) for x in self._clusters]
+        for (k, one), (i, two) in combinations(enumerate(self._clusters), 2):
+            if self._known.shape[1] >= self._most:
+                return
+            if felt[k] & felt[i]:
+                yield from self._within(one, two)
 
     def _about_one_point(self) -> list[list[int]]:
         """Gather joints that follow each other at one point; one alone is a list of its own."""
