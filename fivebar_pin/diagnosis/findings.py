@@ -19,6 +19,7 @@ from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = [
     "GIVEN",
+    "ROUNDED",
     "STILL",
     "about_actuation",
     "about_idle",
@@ -33,6 +34,7 @@ __all__ = [
 
 
 GIVEN = 1e-9  # residual up to which a given configuration counts as closed, and as within limits [m or rad]
+ROUNDED = "If its dimensions are rounded, state how far its loops may stay open: closure_tolerance, --tolerance."
 STILL = 1e-8  # scaled speed below which a joint counts as standing still [-]
 _NEAR = 1e-2  # distance to a type 2 singularity that is worth a warning [-]
 _ROADS = 1e-9  # difference of the two roads of inverse dynamics, of what adds up, that is no round-off [-]
@@ -64,7 +66,7 @@ def about_mobility(
     if all(isinstance(c, Still) for c in chain.closures):
         yield Finding("note", "there are no closures: this is an open tree")
     if chain.nv == generic.rank:
-        yield Finding("error", "the mechanism cannot move: mobility 0. A closure or its kind is too much.")
+        yield Finding("error", f"the mechanism cannot move: mobility 0. A closure or its kind is too much. {ROUNDED}")
     if here.rank < generic.rank:
         yield Finding("error", jump(chain, here, generic, "this configuration"))
     always, closed = ([r for r in redundant if r.scope == scope] for scope in ("always", "closed"))

@@ -205,7 +205,7 @@ def _by_decomposition(chain: ClosedChain, path: Trajectory, unbalanced: Array, e
     tree = loops.tree
     poses = tree.poses(path.q)
     seen = loops.see(path.q)
-    decomposed = Decomposed.of(loops.scaled(seen.J))
+    decomposed = Decomposed.of(loops.scaled(seen.J), loops.misfit)
     ranks = decomposed.ranks
     multipliers = decomposed.carry(unbalanced * loops.column_scale, ranks) * loops.row_scale
     moving = body_rates(tree, Bodies.of(chain), poses, tree.rates(path.q, path.v), path.a)

@@ -130,8 +130,8 @@ def closed_enough(loops: Loops, residual: npt.ArrayLike, tolerance: float) -> np
 
 
 def most_open(loops: Loops, tolerance: float) -> float:
-    """Return the residual up to which a configuration is closed: the tolerance times the chain's length (or 1 rad)."""
-    return tolerance * max(1.0, loops.length)
+    """Return the residual up to which a configuration is closed: the larger tolerance, times a length above 1 m."""
+    return max(tolerance, loops.tolerance) * max(1.0, loops.length)
 
 
 def nudged(loops: Loops, q: Array) -> Array:

@@ -152,6 +152,7 @@ class Parts:
         length: of the chain [m].
         left: of every closure, combinations of its rows that say nothing anywhere, where they are known.
         dimensions: of other designs, one or many, in place of its own.
+        misfit: scaled residual up to which closures count as met [-].
         bodiless: whether bodies that weigh nothing get a place as well: in other designs they may be some.
     """
 
@@ -165,6 +166,7 @@ class Parts:
     left: Sequence[Sequence[Row]] = ()
     dimensions: Dimensions | None = None
     bodiless: bool = False
+    misfit: float = 0.0
 
 
 def layout_of(parts: Parts) -> tuple[e.Integers, Array]:
@@ -264,6 +266,7 @@ class _Layout:
         self.head[e.SCALE] = self._put(parts.scale)
         losses = (model.armature, model.damping, model.upperDryFrictionLimit)
         self.head[e.LOSSES] = self._put(np.column_stack([np.array(x) for x in losses]))
+        self.head[e.MISFIT] = self._put([parts.misfit])
         return {
             "fixed": [self._put(np.zeros(14)), *(self._put_each(self._fixed(x)) for x in parts.links)],
             "mass": [-1, *(self._mass(j) for j in range(1, len(parts.links) + 1))],
@@ -351,7 +354,7 @@ class _Layout:
             e.J_HERE: jacobian,
             e.J_BEFORE: jacobian, e.SIGNS: nb, e.NORMS: nb, e.SIGNS_BEFORE: nb, e.NORMS_BEFORE: nb, e.REACH: 1,
             e.LAST_STEP: 1, e.SECOND_STEP: 1, e.CLOSED: 1, e.GOING: 1, e.STATUS: 1, e.TO: na, e.M_BAR: na * na,
-            e.TO_V: na, e.TO_A: na,
+            e.TO_V: na, e.TO_A: na, e.CORRECTION: 1,
         }  # fmt: skip
         for field, count in sizes.items():
             head[field] = self._room(count)

@@ -83,7 +83,7 @@ class _AllCoordinates:
         residual = here.residual * loops.row_scale
         step = np.zeros((which.size, loops.tree.nv))
         for g, block in zip(loops.independent, here.blocks, strict=True):
-            inverse = truncated_inverse(loops.scaled(block, g.rows, g.columns))
+            inverse = truncated_inverse(loops.scaled(block, g.rows, g.columns), loops.misfit)
             step[:, g.columns] = -np.matmul(inverse, residual[:, g.rows, None])[..., 0]
         step[self._good[which]] = 0.0
         q = loops.tree.integrate(here.q, np.clip(step, -STEP, STEP) * loops.column_scale)
@@ -239,7 +239,7 @@ def passive_sigma(loops: Loops, J: Array, actuated: npt.NDArray[np.intp]) -> flo
     if not passive.size:
         return 1.0
     s = singular_values(loops.scaled(with_held(J, actuated)))
-    return float(s[passive.size - 1]) if ranks_of(s) == passive.size else 0.0
+    return float(s[passive.size - 1]) if ranks_of(s, loops.misfit) == passive.size else 0.0
 
 
 def determining_sets(chain: ClosedChain, site: Configurations, most: int) -> list[tuple[tuple[str, ...], float]]:

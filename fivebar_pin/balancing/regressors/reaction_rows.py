@@ -50,7 +50,7 @@ def reaction_matrices(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array
 
 def _multiplier_map(loops: Loops, J: Array) -> Array:
     """Return X (n, m, nv): closure forces of least norm = X @ unbalanced torque."""
-    decomposed = Decomposed.of(loops.scaled(J))
+    decomposed = Decomposed.of(loops.scaled(J), loops.misfit)
     return loops.scaled(decomposed.carrier(decomposed.ranks))
 
 
