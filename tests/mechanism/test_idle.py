@@ -251,3 +251,51 @@ def test_a_simulation_tells_the_torques_of_what_spins_freely_and_of_a_floating_b
     loads = fb.inverse_dynamics(base, path)
     np.testing.assert_allclose(loads.torque, 0.4, rtol=0.0, atol=1e-6)
     np.testing.assert_allclose(loads.frame_force, 0.0, rtol=0.0, atol=1e-6)
+
+
+def delta_of_rods(*, ball: bool) -> Built:
+    """Return a Delta: three arms, six thin rods along their z axes, a plate that is a body of its own; and q.
+
+    The rods hang on balls, and may spin, or on two hinges. Thin rods have no inertia about their own axis.
+    """
+    model, q, ends, drop = pin.Model(), [], [], -0.6
+    rod = pin.Inertia(0.2, np.array([0.0, 0.0, -0.35]), np.diag([0.2 * 0.7**2 / 12.0] * 2 + [0.0]))
+    for k in range(3):
+        arm = add(model, 0, pin.JointModelRY(), at(rpy=(0.0, 0.0, 2.1 * k)) * at(0.2), f"arm{k}", body(k))
+        q.append([0.1])
+        for side in (-0.05, 0.05):
+            where = at(0.3, side)
+            corner = at(rpy=(0.0, 0.0, 2.1 * k)) * at(0.08, side)
+            if ball:
+                end = add(model, arm, pin.JointModelSpherical(), where, f"rod{k}{side:+}", rod)
+                q.append([0.0, 0.3, 0.0, np.sqrt(0.91)])
+            else:
+                cross = add(model, arm, pin.JointModelRX(), where, f"cross{k}{side:+}", pin.Inertia.Zero())
+                end = add(model, cross, pin.JointModelRY(), at(), f"rod{k}{side:+}", rod)
+                q.append([0.0, 0.6])
+            ends.append((point(model, end, f"end{k}{side:+}", at(z=-0.7)), corner))
+    plate = add(model, 0, pin.JointModelFreeFlyer(), at(), "plate", body(7))
+    q.append([0.0, 0.0, drop, 0.0, 0.0, 0.0, 1.0])
+    corners = [point(model, plate, f"corner_{name}", place) for name, place in ends]
+    closures = [fb.Closure((end, corner)) for (end, _), corner in zip(ends, corners, strict=True)]
+    model.referenceConfigurations["home"] = np.concatenate(q)
+    chain = fb.ClosedChain(model, closures, ("arm0", "arm1", "arm2"), name="delta")
+    return chain, fb.assemble(chain, [0.1, 0.1, 0.1], np.concatenate(q))
+
+
+def test_a_robot_of_rods_between_balls_moves_as_one_whose_rods_cannot_spin():
+    chain, q = delta_of_rods(ball=True)
+    assert [x.kind for x in idle_freedoms(chain)] == [Kind.SPIN] * 6
+    d = fb.diagnose(chain, q)
+    assert d.ok and d.mobility == 3 and "and 6 held at rest" in str(d)
+    other, other_q = delta_of_rods(ball=False)
+    t = np.linspace(0.0, 1.0, 21)
+    motion = fb.motion.combine(*(fb.motion.harmonic(t, 0.1, 0.2, period=1.0 / k) for k in (1, 2, 3)))
+    one, two = fb.drive(chain, motion, q), fb.drive(other, motion, other_q)
+    np.testing.assert_allclose(one.q[:, -7:-4], two.q[:, -7:-4], rtol=0.0, atol=1e-12)
+    torques = [fb.inverse_dynamics(c, p).torque for c, p in ((chain, one), (other, two))]
+    np.testing.assert_allclose(torques[0], torques[1], rtol=0.0, atol=1e-11 * np.abs(torques[1]).max())
+    ranks = [fb.balance_conditions(c, "force").rank for c in (chain, other)]
+    assert ranks[0] + 6 == ranks[1]  # the six crosses are bodies of their own
+    modes = fb.assembly_modes(chain, [0.1, 0.1, 0.1])[:, -7:]
+    assert len(modes) == len(np.unique(np.round(modes, 6), axis=0)) > 1  # a plate stands in one place once
