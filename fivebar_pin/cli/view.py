@@ -8,7 +8,7 @@ import os
 from fivebar_pin._arrays import integer, number
 from fivebar_pin._files import as_path, check_folder, check_new
 from fivebar_pin.cli import _tables
-from fivebar_pin.cli._load import add_gravity, load_any
+from fivebar_pin.cli._load import add_reading, load_any
 from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.dynamics import inverse_dynamics
 
@@ -22,7 +22,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     parser.add_argument("--speed", type=float, default=1.0, help="playing speed over real time [1]")
     parser.add_argument("--port", type=int, help="port of the live view (loopback only); a free one unless given")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
-    add_gravity(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
@@ -38,7 +38,7 @@ def run(chosen: argparse.Namespace) -> int:
         check_folder(file.parent, overwrite=True)
         if os.path.lexists(file):
             check_new(file, overwrite=chosen.overwrite)
-    chain = load_any(chosen.path, chosen.gravity)
+    chain = load_any(chosen)
     trajectory = motion_along(chain, chosen.motion, stand=True)
     shown = [viz.Shown(chain, trajectory, inverse_dynamics(chain, trajectory) if len(trajectory) > 1 else None)]
     if chosen.html is not None:
