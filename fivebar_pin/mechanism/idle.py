@@ -29,7 +29,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 
-__all__ = ["Idle", "Kind", "at_rest", "idle_freedoms"]
+__all__ = ["Idle", "Kind", "at_rest", "carried_by_rests", "idle_freedoms"]
 
 _VANISHING = 1e-8  # scaled speed of a unit freedom that is round-off [-]
 _ONE_POINT = 1e-9  # distance of two joints that turn about one point [chain lengths]
@@ -84,6 +84,19 @@ def at_rest(chain: ClosedChain) -> ClosedChain:
     """
     held = _held(chain)
     return chain if held is None else held
+
+
+def carried_by_rests(chain: ClosedChain) -> Iterator[tuple[int, int]]:
+    """Yield what holds bodies at rest, by its number among the closures of a chain, and the joints that it acts in.
+
+    What holds a body at rest acts between it and what carries it, in the joints between the two.
+    """
+    for k, anchored in enumerate(loops_of(chain).anchored):
+        if isinstance(anchored.closure, Spin):
+            carrier, j = anchored.joints
+            while j != carrier:
+                yield k, j
+                j = int(chain.model.parents[j])
 
 
 @once_per_chain

@@ -168,6 +168,40 @@ def test_both_roads_and_the_evaluator_take_it(make, bodies):
         np.testing.assert_allclose(evaluator.torque, one.torque[k], rtol=0.0, atol=1e-9 * np.abs(one.torque).max())
 
 
+@spinning
+def test_reactions_hold_every_body_and_the_rod_by_a_couple_about_its_axis_alone(make, bodies):
+    """Newton and Euler for each body, from the reactions of its joints and closures."""
+    chain, q = make()
+    path = swing(chain, q, 5)
+    loads = fb.inverse_dynamics(chain, path)
+    model, data, k = chain.model, chain.model.createData(), 3
+    pin.forwardKinematics(model, data, path.q[k], path.v[k], path.a[k])
+    pin.updateFramePlacements(model, data)
+    left = np.zeros((model.njoints, 6))
+    for j in range(1, model.njoints):
+        I, M = model.inertias[j], data.oMi[j]
+        needed = M.act(I * data.a[j] + data.v[j].cross(I * data.v[j]))
+        weight, centre = I.mass * model.gravity.linear, M.act(I.lever)
+        left[j] += np.r_[needed.linear - weight, needed.angular - np.cross(centre, weight)]
+        f, n = np.split(loads.joint_reactions[k, j - 1], 2)
+        wrench = np.r_[f, n + np.cross(M.translation, f)]
+        left[j] -= wrench
+        left[int(model.parents[j])] += wrench
+    for c, closure in enumerate(chain.closures):
+        one, two = (model.frames[model.getFrameId(name)] for name in closure.frames)
+        f, n = np.split(loads.closure_reactions[k, c], 2)
+        wrench = np.r_[f, n + np.cross(data.oMf[model.getFrameId(closure.frames[1])].translation, f)]
+        left[int(two.parentJoint)] -= wrench
+        left[int(one.parentJoint)] += wrench
+    assert np.abs(left[1:]).max() < 1e-10 * np.abs(loads.joint_reactions[k]).max()
+    (rest,) = (c for c in at_rest(chain).closures if isinstance(c, Spin))
+    top = int(rest.frames[1].split()[-1])
+    if model.joints[top].nv == 6:
+        local = loads.joint_reactions_local[k, top - 1]
+        np.testing.assert_allclose(local[:3], 0.0, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(np.cross(local[3:], np.asarray(rest.axis)), 0.0, rtol=0.0, atol=1e-12)
+
+
 def test_nothing_holds_them_in_a_simulation():
     """A rod that spins goes on spinning: forward dynamics is that of the mechanism as it is."""
     chain, q = floating_rod()
