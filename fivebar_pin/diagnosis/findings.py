@@ -51,9 +51,9 @@ def jump(chain: ClosedChain, here: Configurations, generic: Configurations, wher
 def about_idle(idle: tuple[Idle, ...]) -> Iterator[Finding]:
     """Name the freedoms that move nothing else."""
     for x in idle:
-        if x.kind is Kind.PROP:
+        if x.kind == Kind.PROP:
             yield Finding("note", f"{x}: left out of the count")
-        elif x.kind is Kind.BASE:
+        elif x.kind == Kind.BASE:
             yield Finding("note", f"{x}: held where it stands unless it is simulated")
         else:
             yield Finding("warning" if x.kind is Kind.LOOSE else "note", f"{x}: held at rest unless it is simulated")
