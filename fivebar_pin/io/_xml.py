@@ -14,7 +14,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES, read_bounded
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 
-__all__ = ["HUGE", "UNIT", "UNLIMITED", "Reader", "direction", "parse_xml"]
+__all__ = ["HUGE", "UNIT", "UNLIMITED", "Reader", "direction", "parse_text", "parse_xml"]
 
 MAX_DEPTH = 200
 MAX_ELEMENTS = 200_000
@@ -59,16 +59,26 @@ def parse_xml(path: Path, *, root: str, max_bytes: int = MAX_BYTES) -> ElementTr
     Raises:
         FileFormatError: not readable, not well formed, hostile, or another kind of file.
     """
+    return parse_text(path, read_bounded(path, max_bytes), roots=(root,))
+
+
+def parse_text(path: Path, text: bytes, *, roots: tuple[str, ...]) -> ElementTree.Element:
+    """Return the root element of a text that came from a file; its tag must be one of `roots`.
+
+    Raises:
+        FileFormatError: not well formed, hostile, or another kind of file.
+    """
     parser = ElementTree.XMLParser(target=_Builder(path))
     try:
-        parser.feed(read_bounded(path, max_bytes))
+        parser.feed(text)
         element = parser.close()
     except FileFormatError:
         raise
     except (ElementTree.ParseError, LookupError, ValueError, RecursionError) as error:
         raise FileFormatError(path, f"is not well-formed XML ({error})") from error
-    if not isinstance(element, ElementTree.Element) or element.tag != root:
-        raise FileFormatError(path, f"has the root element <{getattr(element, 'tag', None)}>; expected <{root}>")
+    if not isinstance(element, ElementTree.Element) or element.tag not in roots:
+        expected = " or ".join(f"<{root}>" for root in roots)
+        raise FileFormatError(path, f"has the root element <{getattr(element, 'tag', None)}>; expected {expected}")
     return element
 
 

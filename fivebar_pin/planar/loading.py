@@ -12,7 +12,7 @@ from fivebar_pin._files import MAX_BYTES, as_path
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError
-from fivebar_pin.io._load import is_linkage_file
+from fivebar_pin.io._find import is_linkage_file
 from fivebar_pin.planar._reading import load as load_linkage
 
 __all__ = ["load"]
