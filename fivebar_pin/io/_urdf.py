@@ -165,7 +165,7 @@ def _mimic(reader: Reader, element: ElementTree.Element, name: str, where: str) 
 
 def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> Array:
     stated = reader.only(element, "axis", where)
-    reader.known(stated, ("xyz",), where)
+    reader.known(stated, ("xyz", "rpy"), where)  # rpy turns no axis, and is written by some all the same
     axis = np.array(reader.numbers(stated, "xyz", 3, where, [1.0, 0.0, 0.0]))
     if kind in ("fixed", "floating"):
         return axis

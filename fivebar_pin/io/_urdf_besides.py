@@ -157,7 +157,8 @@ def unread(robot: ElementTree.Element) -> list[str]:
     """Return, in words, what elements of the file have no part in the motion of rigid bodies."""
     settings = [child for child in robot.findall("gazebo/*") if child.tag not in _READ_OF_GAZEBO]
     of_gazebo = [f"gazebo {child.tag if child.tag in ('plugin', 'sensor') else 'setting'}" for child in settings]
-    other = [local(element) for element in robot if local(element) not in _READ]
-    for tag, known in (("link", IN_LINK), ("joint", IN_JOINT)):
-        other += [f"{local(e)} of a {tag}" for element in robot.findall(tag) for e in element if local(e) not in known]
-    return of_gazebo + other
+    other = [element for element in robot if local(element) not in _READ]
+    for path, known in (("link/*", IN_LINK), ("joint/*", IN_JOINT)):
+        other += [element for element in robot.findall(path) if local(element) not in known]
+    turned = ["axis rpy" for axis in robot.findall("joint/axis") if "rpy" in axis.attrib]
+    return [*of_gazebo, *(f"{local(element)} element" for element in other), *turned]

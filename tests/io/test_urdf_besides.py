@@ -166,12 +166,13 @@ def test_what_moves_nothing_is_told_in_one_line(tmp_path: Path) -> None:
         + '<sensor name="s"/><sensor name="t"/>'
     )
     tree = TREE.replace('<axis xyz="0 0 1"/></joint>', '<axis xyz="0 0 1"/><joint_properties friction="0"/></joint>', 1)
+    tree = tree.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1" rpy="0 0 0"/>', 1)
     path = tmp_path / "square.urdf"
     path.write_text(f'<robot name="square">{tree}{besides}</robot>')
     with pytest.warns(LeftOutWarning) as caught:
         io.load(path)
     (one,) = caught
-    told = "gazebo plugin, gazebo setting, gazebo sensor, 2 sensors, joint_properties of a joint"
+    told = "gazebo plugin, gazebo setting, gazebo sensor, 2 sensor elements, joint_properties element, axis rpy"
     assert str(one.message).endswith(told)
 
 
