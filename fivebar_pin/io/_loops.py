@@ -58,8 +58,8 @@ def close(reader: Reader, tree: TreeEntry, loops: list[Loop]) -> tuple[TreeEntry
     for loop in loops:
         where = f"joint {loop.name!r}"
         if loop.kind not in CLOSING:
-            text = f"closes a loop, and no closure does what a {loop.kind} joint does; "
-            raise reader.fail(where, text + "let this joint carry its child, and cut the loop at a hinge or ball")
+            rule = f"closes a loop, and no closure does what a {loop.kind} joint does; cut the loop at a hinge or ball"
+            raise reader.fail(where, rule)
         frames = []
         for k, (link, placement) in enumerate(zip(loop.links, loop.placements, strict=True), start=1):
             if link not in tree.links:

@@ -17,7 +17,9 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.io._entries import TreeEntry
+from fivebar_pin.io._gazebo import controlled, detachable, others
 from fivebar_pin.io._loops import Loop, world_poses
+from fivebar_pin.io._sdf_frames import relative
 from fivebar_pin.io._sdf_pose import read_pose, text_numbers
 from fivebar_pin.io._urdf_pose import stated_pose
 from fivebar_pin.io._xml import Reader, direction
@@ -31,7 +33,7 @@ _CLOSING = re.compile(r"(closing_.+)_([12])")
 _READ = ("link", "joint", "material", "transmission", "ros2_control", "gazebo", *_DIALECTS, _BALL)
 IN_LINK = ("inertial", "visual", "collision", "collision_checking", "self_collision_checking", "contact")
 IN_JOINT = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
-_READ_OF_GAZEBO = ("joint", "springStiffness", "springReference")
+_READ_OF_GAZEBO = ("joint", "plugin", "springStiffness", "springReference")
 _X = [1.0, 0.0, 0.0]
 
 
@@ -48,9 +50,9 @@ def read_loops(reader: Reader, robot: ElementTree.Element, tree: TreeEntry) -> l
             loops.append(_stated_loop(reader, element))
         elif local(element) == _BALL:
             loops.append(_ball(reader, element, len(loops)))
-    gazebo = robot.findall("gazebo/joint")
-    poses = world_poses(tree) if gazebo else {}
-    return loops + [_gazebo_loop(reader, element, poses, tree.root) for element in gazebo]
+    poses = world_poses(tree)
+    loops += [_gazebo_loop(reader, element, poses, tree.root) for element in robot.findall("gazebo/joint")]
+    return loops + detachable(reader, robot.findall("gazebo/plugin"), poses)
 
 
 def _gazebo_loop(reader: Reader, element: ElementTree.Element, poses: dict[str, Array], root: str) -> Loop:
@@ -64,7 +66,7 @@ def _gazebo_loop(reader: Reader, element: ElementTree.Element, poses: dict[str, 
     parent, child = ends
     in_child = read_pose(reader, element, where)
     joint = poses[child] @ in_child
-    in_parent = np.linalg.inv(poses[parent]) @ joint
+    in_parent = relative(poses[parent], joint)
     axis = np.array(text_numbers(reader, element, "axis/xyz", 3, where, _X))
     if element.findtext("axis/use_parent_model_frame", "0").strip() in ("1", "true"):
         axis = joint[:3, :3].T @ poses[root][:3, :3] @ axis
@@ -129,9 +131,10 @@ def closing_pairs(tree: TreeEntry) -> list[Loop]:
 
 
 def read_motors(robot: ElementTree.Element, tree: TreeEntry) -> tuple[str, ...]:
-    """Return the joints of transmissions and of ros2_control that take commands and can be driven."""
+    """Return the joints of transmissions, of ros2_control and of controllers that take commands and can be driven."""
     stated = [joint.get("name") for joint in robot.findall("transmission/joint")]
     stated += [j.get("name") for j in robot.findall("ros2_control/joint") if j.find("command_interface") is not None]
+    stated += controlled(robot.findall("gazebo/plugin"))
     driven = ("revolute", "continuous", "prismatic")
     free = {name for name, joint in tree.joints.items() if joint.kind in driven and joint.mimic is None}
     return tuple(dict.fromkeys(name for name in stated if name is not None and name in free))
@@ -156,7 +159,8 @@ def read_springs(reader: Reader, robot: ElementTree.Element, tree: TreeEntry) ->
 def unread(robot: ElementTree.Element) -> list[str]:
     """Return, in words, what elements of the file have no part in the motion of rigid bodies."""
     settings = [child for child in robot.findall("gazebo/*") if child.tag not in _READ_OF_GAZEBO]
-    of_gazebo = [f"gazebo {child.tag if child.tag in ('plugin', 'sensor') else 'setting'}" for child in settings]
+    of_gazebo = [f"gazebo {'sensor' if child.tag == 'sensor' else 'setting'}" for child in settings]
+    of_gazebo += ["gazebo plugin"] * others(robot.findall("gazebo/plugin"))
     other = [element for element in robot if local(element) not in _READ]
     for path, known in (("link/*", IN_LINK), ("joint/*", IN_JOINT)):
         other += [element for element in robot.findall(path) if local(element) not in known]
