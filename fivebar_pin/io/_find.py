@@ -82,7 +82,7 @@ def is_linkage_file(path: Path) -> bool:
 def sidecar_file(tree: Path) -> Path | None:
     """Return the sidecar that is read with a tree: of the same name, or the only one of a folder with one such tree.
 
-    Linkage files are YAML too, and no sidecars.
+    The only one counts where no other tree is called like it. Linkage files are YAML too, and no sidecars.
     """
     beside = [file for file in _in_folder(tree.parent, (".yaml", ".yml")) if not is_linkage_file(file)]
     same = [file for file in beside if file.stem in (tree.stem, stem(tree))]
@@ -91,7 +91,8 @@ def sidecar_file(tree: Path) -> Path | None:
     if same:
         return same[0]
     alone = len(beside) == 1 and len(_in_folder(tree.parent, (tree.suffix.lower(),))) == 1
-    return beside[0] if alone else None
+    taken = {name for other in _in_folder(tree.parent, TREES) for name in (other.stem, stem(other))}
+    return beside[0] if alone and beside[0].stem not in taken else None
 
 
 def stem(tree: Path) -> str:

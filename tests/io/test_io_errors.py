@@ -54,6 +54,18 @@ MJCF = """<mujoco><compiler angle="radian"/><default><default class="d"><joint d
 """
 
 
+SDF = """<sdf version="1.7"><world name="w"><gravity>0 0 -9.81</gravity><model name="m"><pose>0 0 1 0 0 0</pose>
+<link name="one"><pose relative_to="f">0.1 0 0 0 0 0.2</pose><inertial><mass>1</mass><inertia><ixx>0.1</ixx></inertia>
+</inertial><visual name="v"><geometry><box><size>1 1 1</size></box></geometry></visual></link><frame name="f"/>
+<model name="n"><link name="two"/></model><link name="three"/>
+<joint name="a" type="revolute"><parent>world</parent><child>one</child><axis><xyz expressed_in="f">0 0 1</xyz><limit>
+<lower>-1</lower><upper>inf</upper></limit><dynamics><damping>1</damping></dynamics></axis></joint>
+<joint name="b" type="universal"><parent>one</parent><child>n::two</child><axis><xyz>1 0 0</xyz></axis><axis2/></joint>
+<joint name="c" type="prismatic"><parent>n::two</parent><child>three</child><axis/></joint>
+<joint name="d" type="ball"><parent>world</parent><child>three</child></joint></model></world></sdf>
+"""
+
+
 def write(folder: Path, urdf: str = URDF, sidecar: str | None = SIDECAR) -> Path:
     (folder / "robot.urdf").write_text(urdf, encoding="utf-8")
     if sidecar is not None:
@@ -513,6 +525,15 @@ def test_a_spoilt_sidecar_is_a_chain_or_our_error(tmp_path: Path, text: str) -> 
     accepted(write(tmp_path, sidecar=text))
 
 
+@pytest.mark.filterwarnings("ignore::fivebar_pin.errors.LeftOutWarning")
+@FUZZ
+@given(text=spoilt(SDF))
+def test_a_spoilt_sdf_is_a_chain_or_our_error(tmp_path: Path, text: str) -> None:
+    """No crash, no hang, no foreign exception."""
+    (tmp_path / "robot.sdf").write_text(text, encoding="utf-8")
+    accepted(tmp_path / "robot.sdf")
+
+
 @FUZZ
 @given(text=spoilt(MJCF))
 def test_a_spoilt_mjcf_is_a_chain_or_our_error(tmp_path: Path, text: str) -> None:
@@ -522,12 +543,12 @@ def test_a_spoilt_mjcf_is_a_chain_or_our_error(tmp_path: Path, text: str) -> Non
 
 
 @FUZZ
-@given(data=st.binary(max_size=300), which=st.sampled_from(["robot.urdf", "robot.yaml", "robot.xml"]))
+@given(data=st.binary(max_size=300), which=st.sampled_from(["robot.urdf", "robot.yaml", "robot.xml", "robot.sdf"]))
 def test_random_bytes_are_our_error(tmp_path: Path, data: bytes, which: str) -> None:
     """Noise in either file is refused."""
     write(tmp_path)
     (tmp_path / which).write_bytes(data)
-    assert not accepted(tmp_path / ("robot.xml" if which == "robot.xml" else "robot.urdf"))
+    assert not accepted(tmp_path / ("robot.urdf" if which == "robot.yaml" else which))
 
 
 def test_the_unspoilt_texts_of_the_fuzz_tests_are_accepted(tmp_path: Path) -> None:
@@ -535,6 +556,8 @@ def test_the_unspoilt_texts_of_the_fuzz_tests_are_accepted(tmp_path: Path) -> No
     assert accepted(write(tmp_path))
     (tmp_path / "m.xml").write_text(MJCF)
     assert accepted(tmp_path / "m.xml")
+    (tmp_path / "m.sdf").write_text(SDF)
+    assert accepted(tmp_path / "m.sdf")
     chain = io.load(tmp_path / "m.xml")
     np.testing.assert_array_equal(chain.model.referenceConfigurations["home"], [0.1, 0.2])
     assert accepted(write(tmp_path, sidecar=SIDECAR + MORE))

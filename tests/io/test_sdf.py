@@ -642,3 +642,8 @@ def test_an_open_tree_asks_for_a_sidecar_and_takes_one(tmp_path: Path) -> None:
         io.load(path)
     (tmp_path / "arm.yaml").write_text("closed_loop: []\ntype: []\nname_mot: [elbow]\n")
     assert io.load(tmp_path).actuated == ("elbow",)
+    (tmp_path / "arm.yaml").rename(tmp_path / "sidecar.yaml")
+    assert io.load(tmp_path).actuated == ("elbow",)
+    (tmp_path / "sidecar.urdf").write_text("<robot/>")  # now it is the sidecar of another one
+    with pytest.raises(FileFormatError, match="has no sidecar"):
+        io.load(path)

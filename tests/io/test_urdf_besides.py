@@ -159,6 +159,19 @@ def test_springs_that_gazebo_puts_on_joints_are_taken(tmp_path: Path) -> None:
         io.load(write(tmp_path, GAZEBO + spring.format("g")))
 
 
+def test_plugins_of_gazebo_state_welds_and_motors(tmp_path: Path) -> None:
+    """A weld where the links are with all joints at zero; the joints that controllers name."""
+    ends = "<parent_link>{}</parent_link><child_model>square</child_model><child_link>{}</child_link>"
+    weld = '<gazebo><plugin filename="f" name="gz::sim::systems::DetachableJoint">{}</plugin></gazebo>'
+    drive = '<gazebo><plugin filename="joint-controller" name="c"><joint_name>d</joint_name></plugin></gazebo>'
+    chain = io.load(write(tmp_path, weld.format(ends.format("coupler", "rocker")) + drive))
+    assert [(c.name, c.kind) for c in chain.closures] == [("coupler~rocker", "6d")]
+    assert chain.actuated == ("d",)
+    np.testing.assert_allclose(fb.closure_residual(chain, np.zeros(3)), 0.0, atol=1e-15)
+    with pytest.raises(FileFormatError, match="plugin DetachableJoint: Unknown link 'rock'"):
+        io.load(write(tmp_path, weld.format(ends.format("coupler", "rock"))))
+
+
 def test_what_moves_nothing_is_told_in_one_line(tmp_path: Path) -> None:
     besides = (
         '<gazebo><plugin name="p" filename="p.so"/></gazebo><gazebo reference="crank"><mu1>1</mu1><sensor/></gazebo>'
@@ -172,7 +185,7 @@ def test_what_moves_nothing_is_told_in_one_line(tmp_path: Path) -> None:
     with pytest.warns(LeftOutWarning) as caught:
         io.load(path)
     (one,) = caught
-    told = "gazebo plugin, gazebo setting, gazebo sensor, 2 sensor elements, joint_properties element, axis rpy"
+    told = "gazebo setting, gazebo sensor, gazebo plugin, 2 sensor elements, joint_properties element, axis rpy"
     assert str(one.message).endswith(told)
 
 
