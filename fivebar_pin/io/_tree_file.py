@@ -8,6 +8,7 @@ from fivebar_pin._files import MAX_BYTES, read_bounded
 from fivebar_pin.io._sdf import read_sdf
 from fivebar_pin.io._stated import Stated
 from fivebar_pin.io._urdf import read_urdf
+from fivebar_pin.io._xacro import expanded
 from fivebar_pin.io._xml import parse_text
 
 __all__ = ["read_tree"]
@@ -24,5 +25,7 @@ def read_tree(path: Path, *, named_loops: bool = False, max_bytes: int = MAX_BYT
     Raises:
         FileFormatError: anything that is not a tree of known joints with finite numbers; names file and element.
     """
-    root = parse_text(path, read_bounded(path, max_bytes), roots=("robot", "sdf"))
+    is_xacro = path.suffix.lower() == ".xacro"
+    text = expanded(path, max_bytes) if is_xacro else read_bounded(path, max_bytes)
+    root = parse_text(path, text, roots=("robot", "sdf"))
     return read_sdf(path, root) if root.tag == "sdf" else read_urdf(path, root, named_loops=named_loops)
