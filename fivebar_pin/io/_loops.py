@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,9 @@ from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.io._entries import JointEntry, LinkEntry, TreeEntry
 from fivebar_pin.io._xml import Reader
 
-__all__ = ["CLOSING", "Loop", "close", "world_poses"]
+__all__ = ["CLOSING", "Loop", "close", "closing_pairs", "world_poses"]
+
+_NAMED = re.compile(r"(closing_.+)_([12])")
 
 CLOSING: dict[str, type[Closure]] = {
     "revolute": Revolute,
@@ -87,3 +90,15 @@ def world_poses(tree: TreeEntry) -> dict[str, Array]:
             poses[joint.child] = poses[link] @ joint.placement @ joint.offset
             front.append(joint.child)
     return poses
+
+
+def closing_pairs(tree: TreeEntry) -> list[Loop]:
+    """Return the loops that only the names of two links state: a point."""
+    found: dict[str, dict[str, str]] = {}
+    for link in tree.links:
+        said = _NAMED.fullmatch(link)
+        if said:
+            found.setdefault(said[1], {})[said[2]] = link
+    placed = (np.eye(4), np.eye(4))
+    pairs = {name: (ends["1"], ends["2"]) for name, ends in found.items() if len(ends) == 2}
+    return [Loop(name, "ball", ends, placed, np.array([1.0, 0.0, 0.0])) for name, ends in pairs.items()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -9,10 +10,10 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import FileFormatError
-from fivebar_pin.io._entries import UNIVERSE, LinkEntry
+from fivebar_pin.io._entries import UNIVERSE, JointEntry, LinkEntry, TreeEntry
 from fivebar_pin.io._gazebo import controlled, detachable, others
-from fivebar_pin.io._loops import close
-from fivebar_pin.io._sdf_frames import WORLD, Frames
+from fivebar_pin.io._loops import close, closing_pairs
+from fivebar_pin.io._sdf_frames import WORLD, Frames, relative
 from fivebar_pin.io._sdf_joints import SdfJoint, read_joint
 from fivebar_pin.io._sdf_link import read_link
 from fivebar_pin.io._sdf_pose import text_numbers
@@ -29,12 +30,13 @@ _IN_WORLD = ("model", "gravity", "include")
 """Elements of a world that are read, or told of one by one."""
 
 
-def read_sdf(path: Path, sdf: ElementTree.Element) -> Stated:
+def read_sdf(path: Path, sdf: ElementTree.Element, *, named_loops: bool = False) -> Stated:
     """Return what an SDF file states.
 
     Args:
         path: the file.
         sdf: its root element.
+        named_loops: close loops that are stated only by frames called closing_NAME_1 and closing_NAME_2.
 
     Raises:
         FileFormatError: anything but one model of known joints with finite numbers; names file and element.
@@ -60,11 +62,14 @@ def read_sdf(path: Path, sdf: ElementTree.Element) -> Stated:
     root = _root(joints, links, poses)
     plugins = model.findall("plugin")
     stated = hang(reader, model.get("name") or path.stem, root, links, poses, joints)
-    tree, welds = close(reader, stated.tree, detachable(reader, plugins, poses))
+    tree = _with_frames(frames, stated.tree, poses)
+    tree, joined = close(
+        reader, tree, detachable(reader, plugins, poses) + (closing_pairs(tree) if named_loops else [])
+    )
     motors = [name for name in dict.fromkeys(controlled(plugins)) if name in tree.joints]
     told += ["plugin"] * others(plugins) + ["sensor" for _ in model.findall("joint/sensor")]
     told += [str(element.tag) for element in model if element.tag not in _IN_MODEL]
-    closures = (*stated.closures, *welds)
+    closures = (*stated.closures, *joined)
     return Stated(tree, closures, tuple(motors), stated.springs, gravity, [*told, *stated.left_out])
 
 
@@ -93,6 +98,20 @@ def _the_model(
     if not stated:
         return moving[0], None, told
     return moving[0], tuple(text_numbers(reader, stated[0], "gravity", 3, "<world>", None)), told
+
+
+def _with_frames(frames: Frames, tree: TreeEntry, poses: dict[str, Array]) -> TreeEntry:
+    """Return the tree with the <frame>s of the model as links without mass, for sidecars to name."""
+    links, joints = dict(tree.links), dict(tree.joints)
+    for thing in frames.of("frame"):
+        carrier = frames.link(thing.name, "", f"frame {thing.name!r}")
+        if carrier in poses and thing.name not in joints:
+            placement = relative(poses[carrier], frames.pose(thing))
+            links[thing.name] = LinkEntry(thing.name)
+            joints[thing.name] = JointEntry(
+                thing.name, "fixed", carrier, thing.name, placement, np.array([1.0, 0.0, 0.0])
+            )
+    return replace(tree, links=links, joints=joints)
 
 
 def _root(joints: list[SdfJoint], links: dict[str, LinkEntry], poses: dict[str, Array]) -> str:

@@ -19,7 +19,7 @@ def read_tree(path: Path, *, named_loops: bool = False, max_bytes: int = MAX_BYT
 
     Args:
         path: the file.
-        named_loops: close the loops that a URDF states by the names of frames only, closing_NAME_1 and closing_NAME_2.
+        named_loops: close the loops that are stated by the names of frames only, closing_NAME_1 and closing_NAME_2.
         max_bytes: size above which it is not read.
 
     Raises:
@@ -28,4 +28,5 @@ def read_tree(path: Path, *, named_loops: bool = False, max_bytes: int = MAX_BYT
     is_xacro = path.suffix.lower() == ".xacro"
     text = expanded(path, max_bytes) if is_xacro else read_bounded(path, max_bytes)
     root = parse_text(path, text, roots=("robot", "sdf"))
-    return read_sdf(path, root) if root.tag == "sdf" else read_urdf(path, root, named_loops=named_loops)
+    read = read_sdf if root.tag == "sdf" else read_urdf
+    return read(path, root, named_loops=named_loops)

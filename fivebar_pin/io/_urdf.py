@@ -13,9 +13,9 @@ from fivebar_pin.closures import Coupling
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._build import stated_inertia
 from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry
-from fivebar_pin.io._loops import close
+from fivebar_pin.io._loops import close, closing_pairs
 from fivebar_pin.io._stated import Stated
-from fivebar_pin.io._urdf_besides import IN_JOINT, IN_LINK, closing_pairs, read_loops, read_motors, read_springs, unread
+from fivebar_pin.io._urdf_besides import IN_JOINT, IN_LINK, read_loops, read_motors, read_springs, unread
 from fivebar_pin.io._urdf_pose import pose
 from fivebar_pin.io._urdf_visual import Colours, read_colours, read_visual
 from fivebar_pin.io._xml import UNIT, Reader, direction

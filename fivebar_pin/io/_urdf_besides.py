@@ -9,7 +9,6 @@ frames (links) called closing_NAME_1 and closing_NAME_2, which meet at a point
 
 from __future__ import annotations
 
-import re
 from xml.etree import ElementTree
 
 import numpy as np
@@ -25,11 +24,10 @@ from fivebar_pin.io._urdf_pose import stated_pose
 from fivebar_pin.io._xml import Reader, direction
 from fivebar_pin.springs import JointSpring
 
-__all__ = ["IN_JOINT", "IN_LINK", "closing_pairs", "read_loops", "read_motors", "read_springs", "unread"]
+__all__ = ["IN_JOINT", "IN_LINK", "read_loops", "read_motors", "read_springs", "unread"]
 
 _DIALECTS = ("loop_joint", "loop", "constraint")
 _BALL = "ball_constraint"
-_CLOSING = re.compile(r"(closing_.+)_([12])")
 _READ = ("link", "joint", "material", "transmission", "ros2_control", "gazebo", *_DIALECTS, _BALL)
 IN_LINK = ("inertial", "visual", "collision", "collision_checking", "self_collision_checking", "contact")
 IN_JOINT = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
@@ -116,18 +114,6 @@ def _unit(reader: Reader, axis: Array, where: str) -> Array:
         return direction(axis)
     except ValueError:
         raise reader.fail(where, f"axis {axis.tolist()} has no direction") from None
-
-
-def closing_pairs(tree: TreeEntry) -> list[Loop]:
-    """Return the loops that only the names of two links state: a point."""
-    found: dict[str, dict[str, str]] = {}
-    for link in tree.links:
-        said = _CLOSING.fullmatch(link)
-        if said:
-            found.setdefault(said[1], {})[said[2]] = link
-    placed = (np.eye(4), np.eye(4))
-    pairs = {name: (ends["1"], ends["2"]) for name, ends in found.items() if len(ends) == 2}
-    return [Loop(name, "ball", ends, placed, np.array(_X)) for name, ends in pairs.items()]
 
 
 def read_motors(robot: ElementTree.Element, tree: TreeEntry) -> tuple[str, ...]:

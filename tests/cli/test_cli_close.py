@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -195,3 +196,36 @@ def test_only_a_urdf_can_be_closed(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main(["new", "four-bar", "--out", str(tmp_path / "mine.yaml")]) == 0
     assert main(["close", str(tmp_path / "mine.yaml")]) == 1
     assert "is a linkage file, not a tree: its points close its loops" in capsys.readouterr().err
+
+
+SQUARE = """<sdf version="1.7"><model name="square"><link name="crank"/><link name="coupler"><pose>0 1 0 0 0 0</pose>
+</link><link name="rocker"><pose>1 0 0 0 0 0</pose></link>
+<frame name="end" attached_to="coupler"><pose>1 0 0 0 0 0</pose></frame>
+<joint name="a" type="revolute"><parent>world</parent><child>crank</child><axis/></joint>
+<joint name="b" type="revolute"><parent>crank</parent><child>coupler</child><axis/></joint>
+<joint name="d" type="revolute"><parent>world</parent><child>rocker</child><axis/></joint>{}</model></sdf>
+"""
+OPEN = (
+    '<frame name="loop_A" attached_to="end"/><frame name="loop_B" attached_to="rocker"><pose>0 1 0 0 0 0</pose></frame>'
+)
+CLOSED = '<joint name="c" type="ball"><pose>0 1 0 0 0 0</pose><parent>coupler</parent><child>rocker</child></joint>'
+
+
+@pytest.mark.parametrize(("more", "loops"), [(OPEN, 1), (CLOSED, 0)])
+@pytest.mark.parametrize("ending", [".sdf", ".urdf.xacro"])
+def test_an_sdf_and_a_xacro_get_their_sidecar(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, ending: str, more: str, loops: int
+) -> None:
+    """What the file closes itself does not stand in the sidecar again; a xacro is expanded first."""
+    tool = tmp_path / "bin" / "xacro"
+    tool.parent.mkdir()
+    tool.write_text(f"#!{sys.executable}\nimport sys\nprint(open(sys.argv[1]).read())\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tool.parent))
+    file = tmp_path / f"square{ending}"
+    file.write_text(SQUARE.format(more))
+    assert main(["close", str(file)]) == 0
+    assert "mobility 1, exactly actuated" in capsys.readouterr().out
+    chain = fb.load(file)
+    assert (len(chain.closures), chain.actuated) == (1, ("a",))
+    assert (tmp_path / "square.yaml").read_text().count("loop_A") == loops

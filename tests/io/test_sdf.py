@@ -636,6 +636,25 @@ def test_a_plugin_that_joins_what_is_not_there_is_refused(tmp_path: Path) -> Non
         io.load(write(tmp_path, FOUR_BAR.replace("</model>", f"{plugin}</model>")))
 
 
+def test_frames_are_there_for_sidecars_and_close_loops_by_their_names(tmp_path: Path) -> None:
+    """The open square with a frame at the end of either side; one of the frames hangs on another."""
+    ends = (
+        '<frame name="tip" attached_to="coupler"/><frame name="closing_c_1" attached_to="tip"><pose>1 0 0 0 0 0</pose>'
+        '</frame><frame name="closing_c_2" attached_to="rocker"><pose>0 1 0 0 0 0</pose></frame><frame name="o"/>'
+    )
+    path = write(tmp_path, FOUR_BAR[: FOUR_BAR.index(LAST)] + ends + "</model></sdf>")
+    chain = io.load(path)
+    assert [(c.name, c.kind, c.frames) for c in chain.closures] == [("closing_c", "3d", ("closing_c_1", "closing_c_2"))]
+    np.testing.assert_allclose(fb.closure_residual(chain, np.zeros(3)), 0.0, atol=1e-15)
+    np.testing.assert_allclose(placed(chain, {"a": np.pi / 2})["closing_c_1"][:3, 3], [-1.0, 1.0, 0.0], atol=1e-15)
+    (tmp_path / "arm.yaml").write_text(
+        "closed_loop: [[tip, closing_c_2]]\ntype: [distance]\nlength: [1.0]\nname_mot: [a]\n"
+    )
+    assert [c.kind for c in io.load(path).closures] == ["distance"]
+    with pytest.raises(FileFormatError, match="frame 'tip': 'tip' is attached to itself in a circle"):
+        io.load(write(tmp_path, path.read_text().replace('attached_to="coupler"', 'attached_to="closing_c_1"')))
+
+
 def test_an_open_tree_asks_for_a_sidecar_and_takes_one(tmp_path: Path) -> None:
     path = write(tmp_path, ARM)
     with pytest.raises(FileFormatError, match=r"has no sidecar: put arm\.yaml beside it"):
