@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fivebar_pin._files import read_bounded
 from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.io._mjcf_include import mechanism_files
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import MAX_SIDECAR_BYTES
 
@@ -54,6 +55,8 @@ def mechanism_file(path: Path) -> Path:
     for ending in _IN_A_FOLDER:
         found = [file for file in _in_folder(path, (ending,)) if file.name not in _NO_MECHANISMS]
         usual = [file for file in found if stem(file) in (*_USUAL, path.name)]
+        if len(found) > 1 and ending == ".xml" and not usual:
+            found = mechanism_files(found)
         if len(found) == 1 or len(usual) == 1:
             return (usual or found)[0]
         if found:

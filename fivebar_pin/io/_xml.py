@@ -53,17 +53,19 @@ class _Builder(ElementTree.TreeBuilder):
         raise FileFormatError(self._path, "has a DOCTYPE or entities, which are not read; remove the declaration")
 
 
-def parse_xml(path: Path, *, root: str, max_bytes: int = MAX_BYTES) -> ElementTree.Element:
-    """Return the root element of a file whose root tag must be `root`.
+def parse_xml(path: Path, *, root: str | None, max_bytes: int = MAX_BYTES) -> ElementTree.Element:
+    """Return the root element of a file whose root tag must be `root`; None takes any.
 
     Raises:
         FileFormatError: not readable, not well formed, hostile, or another kind of file.
     """
-    return parse_text(path, read_bounded(path, max_bytes), roots=(root,))
+    return parse_text(path, read_bounded(path, max_bytes), roots=() if root is None else (root,))
 
 
 def parse_text(path: Path, text: bytes, *, roots: tuple[str, ...]) -> ElementTree.Element:
-    """Return the root element of a text that came from a file; its tag must be one of `roots`.
+    """Return the root element of a text that came from a file; its tag must be one of `roots`, if there are any.
+
+    A namespace of the root is the one that the format is in, and is taken off all its elements.
 
     Raises:
         FileFormatError: not well formed, hostile, or another kind of file.
@@ -76,7 +78,11 @@ def parse_text(path: Path, text: bytes, *, roots: tuple[str, ...]) -> ElementTre
         raise
     except (ElementTree.ParseError, LookupError, ValueError, RecursionError) as error:
         raise FileFormatError(path, f"is not well-formed XML ({error})") from error
-    if not isinstance(element, ElementTree.Element) or element.tag not in roots:
+    if isinstance(element, ElementTree.Element):
+        namespace, brace, _ = element.tag.rpartition("}")
+        for inside in element.iter():
+            inside.tag = inside.tag.removeprefix(namespace + brace)
+    if not isinstance(element, ElementTree.Element) or (roots and element.tag not in roots):
         expected = " or ".join(f"<{root}>" for root in roots)
         raise FileFormatError(path, f"has the root element <{getattr(element, 'tag', None)}>; expected {expected}")
     return element
