@@ -27,15 +27,14 @@ def text_numbers(
     *,
     bound: float = HUGE,
 ) -> list[float]:
-    """Return the `count` numbers in the text of a descendant; `default` (None: required) where there is none."""
-    text = None if element is None else element.findtext(path)
-    if text is None:
+    """Return the numbers in the text of a descendant; `default` (None: required) where it is absent or empty."""
+    words = ("" if element is None else element.findtext(path, "")).split()
+    if not words:
         if default is None:
             raise reader.fail(where, f"needs <{path}>")
         return list(default)
-    words = text.split()
     if len(words) != count:
-        raise reader.fail(where, f"<{path}> = {text.strip()!r} must be {count} number(s)")
+        raise reader.fail(where, f"<{path}> = {' '.join(words)!r} must be {count} number(s)")
     return [reader.number(word, f"<{path}>", where, bound=bound) for word in words]
 
 

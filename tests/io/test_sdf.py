@@ -311,6 +311,16 @@ def test_shapes_are_drawn_where_the_file_says(tmp_path: Path) -> None:
     np.testing.assert_allclose(sphere.placement, np.linalg.inv(at_zero["upper"]) @ at_zero["base"], atol=1e-15)
 
 
+def test_an_empty_element_says_nothing(tmp_path: Path) -> None:
+    """As <ixy></ixy>, which generators of files write."""
+    text = ARM.replace("<ixx>0.1</ixx>", "<ixx>0.1</ixx><ixy></ixy><ixz> </ixz>").replace(
+        "<lower>-1</lower>", "<lower/>"
+    )
+    model = load(tmp_path, text).model
+    np.testing.assert_array_equal(model.inertias[1].inertia, load(tmp_path, ARM).model.inertias[1].inertia)
+    assert model.lowerPositionLimit[0] == -np.finfo(float).max
+
+
 def test_a_link_without_inertial_has_the_mass_that_sdf_says(tmp_path: Path) -> None:
     """One kilogram and one kg m2; with a mass of zero and no moments none."""
     plain = load(tmp_path, ARM.replace(MASS.format(0.5), ""))

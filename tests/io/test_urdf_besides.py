@@ -149,6 +149,15 @@ def test_what_was_loaded_is_saved_with_its_loops(tmp_path: Path) -> None:
         np.testing.assert_allclose(fb.closure_residual(again, np.zeros(3)), 0.0, atol=1e-15)
 
 
+def test_a_file_in_a_namespace_is_read_as_one_without(tmp_path: Path) -> None:
+    """As Drake writes its own; what is in another namespace is not URDF."""
+    path = write(tmp_path, LOOP_JOINT)
+    other = '<view:camera xmlns:view="http://x"/>'
+    path.write_text(path.read_text().replace('name="square">', f'name="square" xmlns="http://drake.mit.edu">{other}'))
+    with pytest.warns(LeftOutWarning, match="camera element"):
+        assert [c.name for c in io.load(path).closures] == ["c"]
+
+
 def test_springs_that_gazebo_puts_on_joints_are_taken(tmp_path: Path) -> None:
     spring = (
         '<gazebo reference="{}"><springStiffness>3.0</springStiffness><springReference>0.5</springReference></gazebo>'
