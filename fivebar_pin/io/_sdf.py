@@ -115,12 +115,12 @@ def _with_frames(frames: Frames, tree: TreeEntry, poses: dict[str, Array]) -> Tr
 
 
 def _root(joints: list[SdfJoint], links: dict[str, LinkEntry], poses: dict[str, Array]) -> str:
-    """Return what the tree hangs on: the world, where a joint names it; else the first link that is no child.
+    """Return what the tree hangs on: the world, where a joint names it; else the first parent that is no child.
 
-    In a ring of parents and children the first link of all.
+    In a ring of parents and children, and where there is no joint, the first link of all.
     """
     if any(WORLD in (joint.parent, joint.child) for joint in joints) and WORLD not in links:
         links[WORLD], poses[WORLD] = LinkEntry(WORLD), np.eye(4)
         return WORLD
-    children = {joint.child for joint in joints}
-    return next((link for link in links if link not in children), next(iter(links)))
+    first = {joint.parent for joint in joints} - {joint.child for joint in joints}
+    return next((link for link in links if link in first), next(iter(links)))

@@ -46,8 +46,9 @@ class Frames:
     def __init__(self, reader: Reader, model: ElementTree.Element) -> None:
         self.reader = reader
         self.things: dict[str, Thing] = {}
-        self.poses: dict[str, Array] = {}
-        self._under_way: set[str] = set()
+        self.joints: dict[str, Thing] = {}
+        self.poses: dict[tuple[str, str], Array] = {}
+        self._under_way: set[tuple[str, str]] = set()
         self.model = Thing("", "model", model, "")
         self._collect(model, "")
 
@@ -57,24 +58,26 @@ class Frames:
             if tag is None:
                 continue
             name = scope + self.reader.text(element, "name", f"a <{tag}>")
-            if name in self.things:
-                raise self.reader.fail(f"{tag} {name!r}", f"is the name of a {self.things[name].tag} already")
-            self.things[name] = Thing(name, tag, element, scope)
+            known = self.joints if tag == "joint" else self.things
+            if name in known:
+                raise self.reader.fail(f"{tag} {name!r}", f"is the name of a {known[name].tag} already")
+            known[name] = Thing(name, tag, element, scope)
             if tag == "model":
                 self._collect(element, f"{name}::")
 
     def of(self, tag: str) -> list[Thing]:
         """Return the things of one kind."""
-        return [thing for thing in self.things.values() if thing.tag == tag]
+        return [thing for thing in (*self.things.values(), *self.joints.values()) if thing.tag == tag]
 
     def find(self, name: str, scope: str, where: str) -> Thing:
-        """Return the thing that is called so within nested models."""
+        """Return what is called so within nested models; a joint only where nothing else is (up to 1.6 both may be)."""
         if name == "__model__":
             return self.things[scope.removesuffix("::")] if scope else self.model
-        if scope + name not in self.things:
-            known = [thing.name.removeprefix(scope) for thing in self.things.values() if thing.name.startswith(scope)]
+        found = self.things.get(scope + name) or self.joints.get(scope + name)
+        if found is None:
+            known = [x.removeprefix(scope) for x in (*self.things, *self.joints) if x.startswith(scope)]
             raise self.reader.fail(where, str(UnknownNameError("link, joint, frame or model", name, known)))
-        return self.things[scope + name]
+        return found
 
     def link(self, name: str, scope: str, where: str) -> str:
         """Return the link that carries what is called so; the world is the world.
@@ -82,12 +85,12 @@ class Frames:
         Raises:
             FileFormatError: nothing is called so, or it is attached to itself.
         """
-        seen: set[str] = set()
+        seen: set[tuple[str, str]] = set()
         while name != WORLD or scope + name in self.things:
             thing = self.find(name, scope, where)
-            if thing.name in seen:
+            if (thing.tag, thing.name) in seen:
                 raise self.reader.fail(where, f"{thing.name!r} is attached to itself in a circle")
-            seen.add(thing.name)
+            seen.add((thing.tag, thing.name))
             if thing.tag == "link":
                 return thing.name
             name, scope = self._carrier(thing, where)
@@ -108,15 +111,16 @@ class Frames:
 
     def pose(self, thing: Thing) -> Array:
         """Return where a thing is in the world, all joints at zero, homogeneous (4, 4)."""
-        if thing.name not in self.poses:
+        key = (thing.tag, thing.name)
+        if key not in self.poses:
             where = f"{thing.tag} {thing.name!r}"
-            if thing.name in self._under_way:
+            if key in self._under_way:
                 raise self.reader.fail(where, "is placed relative to itself in a circle")
-            self._under_way.add(thing.name)
+            self._under_way.add(key)
             base = self._base(thing, where)
             own = read_pose(self.reader, thing.element, where)
-            self.poses[thing.name] = own if np.array_equal(base, np.eye(4)) else base @ own
-        return self.poses[thing.name]
+            self.poses[key] = own if np.array_equal(base, np.eye(4)) else base @ own
+        return self.poses[key]
 
     def _base(self, thing: Thing, where: str) -> Array:
         if thing is self.model:

@@ -26,6 +26,7 @@ HUGE = 1e30
 UNLIMITED = sys.float_info.max
 """What Pinocchio writes for a limit that is none."""
 
+_DECLARATION = re.compile(rb"<\?xml\s[^>]*\?>")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -65,14 +66,15 @@ def parse_xml(path: Path, *, root: str | None, max_bytes: int = MAX_BYTES) -> El
 def parse_text(path: Path, text: bytes, *, roots: tuple[str, ...]) -> ElementTree.Element:
     """Return the root element of a text that came from a file; its tag must be one of `roots`, if there are any.
 
-    A namespace of the root is the one that the format is in, and is taken off all its elements.
+    A namespace of the root is the one that the format is in, and is taken off all its elements. A declaration that does
+    not stand first, as after a licence in a comment, is passed over, as simulators do.
 
     Raises:
         FileFormatError: not well formed, hostile, or another kind of file.
     """
     parser = ElementTree.XMLParser(target=_Builder(path))
     try:
-        parser.feed(text)
+        parser.feed(text[:1] + _DECLARATION.sub(b"", text[1:]))
         element = parser.close()
     except FileFormatError:
         raise

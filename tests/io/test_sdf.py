@@ -185,6 +185,14 @@ def test_a_nested_model_is_part_of_the_tree(tmp_path: Path) -> None:
     np.testing.assert_allclose(placed(load(tmp_path, whole), q)["low::lower"], turned(ARM, q)["lower"], atol=1e-14)
 
 
+def test_a_link_without_joints_is_no_root(tmp_path: Path) -> None:
+    """It is refused for itself, not the rest because of it."""
+    start, end = ARM.index('<joint name="foot"'), ARM.index('<joint name="shoulder"')
+    text = ARM.replace(ARM[start:end], "").replace('<link name="base">', '<link name="prop"/><link name="base">')
+    with pytest.raises(FileFormatError, match="link 'base': no joint leads from it to link prop; join it"):
+        load(tmp_path, text)
+
+
 def test_without_a_joint_to_the_world_the_root_is_where_its_pose_is(tmp_path: Path) -> None:
     """Held there, or free to fly from there; its mass counts then."""
     start, end = ARM.index('<joint name="foot"'), ARM.index('<joint name="shoulder"')
@@ -309,6 +317,21 @@ def test_shapes_are_drawn_where_the_file_says(tmp_path: Path) -> None:
     assert (sphere.size, sphere.rgba) == ((0.3,), (0.0, 1.0, 0.0, 0.5))
     at_zero = turned(ARM, {})
     np.testing.assert_allclose(sphere.placement, np.linalg.inv(at_zero["upper"]) @ at_zero["base"], atol=1e-15)
+
+
+def test_a_declaration_after_a_comment_is_passed_over(tmp_path: Path) -> None:
+    """A licence before the declaration is no XML, and many models have it."""
+    text = f'<!-- mine -->\n<?xml version="1.0"?>\n{ARM}'
+    assert load(tmp_path, text).joints == ("shoulder", "elbow")
+
+
+def test_a_joint_may_be_called_like_a_link_and_like_the_world(tmp_path: Path) -> None:
+    """Up to 1.6; ends and frames are those of the link then."""
+    text = ARM.replace('name="foot"', 'name="world"').replace('name="shoulder"', 'name="upper"')
+    q = {"shoulder": 0.7, "elbow": -0.4}
+    ours = placed(load(tmp_path, text), {"upper": q["shoulder"], "elbow": q["elbow"]})
+    for link, M in turned(ARM, q).items():
+        np.testing.assert_allclose(ours[link], M, atol=1e-14)
 
 
 def test_an_empty_element_says_nothing(tmp_path: Path) -> None:
@@ -567,6 +590,7 @@ BAD = [
     ('"arm">', '"arm"><static>1</static>', "holds no model that moves; its models are <static>"),
     ("</model>", "<include><uri>model://x</uri></include></model>", "<include> of 'model://x': is not read inside"),
     ("</model>", "<frame name='f'/><frame name='f'/></model>", "frame 'f': is the name of a frame already"),
+    ("</model>", "<joint name='elbow' type='fixed'/></model>", "joint 'elbow': is the name of a joint already"),
     ("</model>", "<link name='apart'/></model>", "link 'world': no joint leads from it to link apart; join it"),
     (
         '<link name="lower">',
