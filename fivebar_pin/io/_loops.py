@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.io._entries import JointEntry, LinkEntry, TreeEntry
 from fivebar_pin.io._xml import Reader
 
-__all__ = ["CLOSING", "Loop", "close", "closing_pairs", "world_poses"]
+__all__ = ["BALL_WORDS", "CLOSING", "Loop", "close", "closing_pairs", "refuse_forces", "shared_point", "world_poses"]
 
+BALL_WORDS = ("body_A", "body_B", "p_AP", "p_BQ")
+"""What Drake's ball constraint states, after its own name."""
+_ACTING = ("drake:joint", "drake:linear_bushing_rpy", "drake:linear_spring_damper", "drake:tendon_constraint")
 _NAMED = re.compile(r"(closing_.+)_([12])")
 
 CLOSING: dict[str, type[Closure]] = {
@@ -90,6 +94,25 @@ def world_poses(tree: TreeEntry) -> dict[str, Array]:
             poses[joint.child] = poses[link] @ joint.placement @ joint.offset
             front.append(joint.child)
     return poses
+
+
+def shared_point(name: str, links: tuple[str, str], points: tuple[list[float], list[float]]) -> Loop:
+    """Return the loop that closes where a point of one link is a point of the other."""
+    one, two = np.eye(4), np.eye(4)
+    one[:3, 3], two[:3, 3] = points
+    return Loop(name, "ball", links, (one, two), np.array([1.0, 0.0, 0.0]))
+
+
+def refuse_forces(reader: Reader, model: ElementTree.Element) -> None:
+    """Refuse elements of Drake that act on the mechanism and are not read.
+
+    Raises:
+        FileFormatError: there is one.
+    """
+    for element in model:
+        if element.tag in _ACTING:
+            rule = "acts on the mechanism and is not read; state a joint, or a spring in the sidecar, and remove it"
+            raise reader.fail(f"<{element.tag}>", rule)
 
 
 def closing_pairs(tree: TreeEntry) -> list[Loop]:

@@ -12,11 +12,11 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.errors import FileFormatError
 from fivebar_pin.io._entries import UNIVERSE, JointEntry, LinkEntry, TreeEntry
 from fivebar_pin.io._gazebo import controlled, detachable, others
-from fivebar_pin.io._loops import close, closing_pairs
+from fivebar_pin.io._loops import BALL_WORDS, Loop, close, closing_pairs, refuse_forces, shared_point
 from fivebar_pin.io._sdf_frames import WORLD, Frames, relative
 from fivebar_pin.io._sdf_joints import SdfJoint, read_joint
 from fivebar_pin.io._sdf_link import read_link
-from fivebar_pin.io._sdf_pose import text_numbers
+from fivebar_pin.io._sdf_pose import said_numbers, text_numbers
 from fivebar_pin.io._sdf_tree import hang
 from fivebar_pin.io._stated import Stated
 from fivebar_pin.io._xml import Reader
@@ -25,7 +25,9 @@ __all__ = ["read_sdf"]
 
 _IN_MODEL = (
     "link", "joint", "frame", "model", "pose", "static", "self_collide", "allow_auto_disable", "enable_wind", "plugin",
+    "drake:ball_constraint", "drake:weld_constraint",
 )  # fmt: skip
+_BALL, _WELD = "drake:ball_constraint", "drake:weld_constraint"
 _IN_WORLD = ("model", "gravity", "include")
 """Elements of a world that are read, or told of one by one."""
 
@@ -48,6 +50,7 @@ def read_sdf(path: Path, sdf: ElementTree.Element, *, named_loops: bool = False)
         rule = "is not read inside a model; `gz sdf -p FILE` writes a model out with all that it includes"
         raise reader.fail(f"<include> of {include.findtext('uri', '').strip()!r}", rule)
     reader.no_misspelt(model, "<model>", tags=_IN_MODEL)
+    refuse_forces(reader, model)
     frames = Frames(reader, model)
     links: dict[str, LinkEntry] = {}
     for thing in frames.of("link"):
@@ -63,12 +66,12 @@ def read_sdf(path: Path, sdf: ElementTree.Element, *, named_loops: bool = False)
     plugins = model.findall("plugin")
     stated = hang(reader, model.get("name") or path.stem, root, links, poses, joints)
     tree = _with_frames(frames, stated.tree, poses)
-    tree, joined = close(
-        reader, tree, detachable(reader, plugins, poses) + (closing_pairs(tree) if named_loops else [])
-    )
+    loops = [*detachable(reader, plugins, poses), *_constraints(reader, frames, model)]
+    tree, joined = close(reader, tree, loops + (closing_pairs(tree) if named_loops else []))
     motors = [name for name in dict.fromkeys(controlled(plugins)) if name in tree.joints]
-    told += ["plugin"] * others(plugins) + ["sensor" for _ in model.findall("joint/sensor")]
-    told += [str(element.tag) for element in model if element.tag not in _IN_MODEL]
+    told += ["plugin"] * others(plugins) + ["sensor"] * len(model.findall("joint/sensor"))
+    told += ["initial position"] * len(model.findall("joint/axis/initial_position"))
+    told += [f"{element.tag} element" for element in model if element.tag not in _IN_MODEL]
     closures = (*stated.closures, *joined)
     return Stated(tree, closures, tuple(motors), stated.springs, gravity, [*told, *stated.left_out])
 
@@ -112,6 +115,30 @@ def _with_frames(frames: Frames, tree: TreeEntry, poses: dict[str, Array]) -> Tr
                 thing.name, "fixed", carrier, thing.name, placement, np.array([1.0, 0.0, 0.0])
             )
     return replace(tree, links=links, joints=joints)
+
+
+def _constraints(reader: Reader, frames: Frames, model: ElementTree.Element) -> list[Loop]:
+    """Return the loops that constraints of Drake close: a point that two bodies share, frames that are one."""
+    loops = []
+    for k, ball in enumerate(_tagged(model, _BALL), start=1):
+        where = f"<{_BALL}>"
+        body_a, body_b, p_a, p_b = ((f"{_BALL}_{word}", _text(ball, f"{_BALL}_{word}")) for word in BALL_WORDS)
+        one, two = (frames.link(name, "", where) for _, name in (body_a, body_b))
+        first, second = (said_numbers(reader, text, tag, 3, where, None) for tag, text in (p_a, p_b))
+        loops.append(shared_point(f"ball_constraint_{k}", (one, two), (first, second)))
+    for weld in _tagged(model, _WELD):
+        one, two = (frames.find(_text(weld, tag), "", f"<{_WELD}>").name for tag in ("parent", "child"))
+        loops.append(Loop(f"{one}~{two}", "fixed", (one, two), (np.eye(4), np.eye(4)), np.array([1.0, 0.0, 0.0])))
+    return loops
+
+
+def _tagged(model: ElementTree.Element, tag: str) -> list[ElementTree.Element]:
+    """Return the children with a tag that has a prefix, which paths of ElementTree do not take as part of it."""
+    return [element for element in model if element.tag == tag]
+
+
+def _text(element: ElementTree.Element, tag: str) -> str:
+    return "".join(child.text or "" for child in _tagged(element, tag)).strip()
 
 
 def _root(joints: list[SdfJoint], links: dict[str, LinkEntry], poses: dict[str, Array]) -> str:

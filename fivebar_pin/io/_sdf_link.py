@@ -35,7 +35,7 @@ def read_link(reader: Reader, frames: Frames, thing: Thing) -> tuple[LinkEntry, 
     where = f"link {thing.name!r}"
     reader.no_misspelt(thing.element, where, tags=_IN_LINK)
     inertial = reader.only(thing.element, "inertial", where)
-    visuals, told = [], [str(element.tag) for element in thing.element if element.tag not in _IN_LINK]
+    visuals, told = [], [f"{element.tag} element" for element in thing.element if element.tag not in _IN_LINK]
     told += ["sensor"] * len(thing.element.findall("sensor"))
     if thing.element.findtext("gravity", "1").strip() in ("0", "false"):
         told.append(f"absence of gravity on link {thing.name!r}")

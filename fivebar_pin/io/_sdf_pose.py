@@ -12,7 +12,7 @@ from fivebar_pin.io._entries import rpy_to_matrix
 from fivebar_pin.io._mjcf_reader import homogeneous, quaternion_matrix
 from fivebar_pin.io._xml import HUGE, Reader
 
-__all__ = ["read_pose", "text_numbers"]
+__all__ = ["read_pose", "said_numbers", "text_numbers"]
 
 _FORMATS = ("euler_rpy", "quat_xyzw")
 
@@ -28,14 +28,23 @@ def text_numbers(
     bound: float = HUGE,
 ) -> list[float]:
     """Return the numbers in the text of a descendant; `default` (None: required) where it is absent or empty."""
-    words = ("" if element is None else element.findtext(path, "")).split()
+    return said_numbers(
+        reader, "" if element is None else element.findtext(path, ""), path, count, where, default, bound
+    )
+
+
+def said_numbers(
+    reader: Reader, text: str, tag: str, count: int, where: str, default: list[float] | None, bound: float = HUGE
+) -> list[float]:
+    """Return the `count` numbers in the text of an element; `default` (None: required) where it is empty."""
+    words = text.split()
     if not words:
         if default is None:
-            raise reader.fail(where, f"needs <{path}>")
+            raise reader.fail(where, f"needs <{tag}>")
         return list(default)
     if len(words) != count:
-        raise reader.fail(where, f"<{path}> = {' '.join(words)!r} must be {count} number(s)")
-    return [reader.number(word, f"<{path}>", where, bound=bound) for word in words]
+        raise reader.fail(where, f"<{tag}> = {' '.join(words)!r} must be {count} number(s)")
+    return [reader.number(word, f"<{tag}>", where, bound=bound) for word in words]
 
 
 def read_pose(reader: Reader, parent: ElementTree.Element, where: str) -> Array:

@@ -17,7 +17,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.io._entries import TreeEntry
 from fivebar_pin.io._gazebo import controlled, detachable, others
-from fivebar_pin.io._loops import Loop, world_poses
+from fivebar_pin.io._loops import BALL_WORDS, Loop, refuse_forces, shared_point, world_poses
 from fivebar_pin.io._sdf_frames import relative
 from fivebar_pin.io._sdf_pose import read_pose, text_numbers
 from fivebar_pin.io._urdf_pose import stated_pose
@@ -27,7 +27,7 @@ from fivebar_pin.springs import JointSpring
 __all__ = ["IN_JOINT", "IN_LINK", "read_loops", "read_motors", "read_springs", "unread"]
 
 _DIALECTS = ("loop_joint", "loop", "constraint")
-_BALL = "ball_constraint"
+_BALL = "drake:ball_constraint"
 _READ = ("link", "joint", "material", "transmission", "ros2_control", "gazebo", *_DIALECTS, _BALL)
 IN_LINK = ("inertial", "visual", "collision", "collision_checking", "self_collision_checking", "contact")
 IN_JOINT = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
@@ -36,17 +36,22 @@ _X = [1.0, 0.0, 0.0]
 
 
 def local(element: ElementTree.Element) -> str:
-    """Return the tag of an element without its namespace."""
-    return str(element.tag).rpartition("}")[2]
+    """Return the tag of an element without its prefix."""
+    return str(element.tag).rpartition(":")[2]
 
 
 def read_loops(reader: Reader, robot: ElementTree.Element, tree: TreeEntry) -> list[Loop]:
-    """Return the loops that elements of the file close."""
+    """Return the loops that elements of the file close.
+
+    Raises:
+        FileFormatError: an element that is malformed, names no link, or acts in a way that is not read.
+    """
+    refuse_forces(reader, robot)
     loops: list[Loop] = []
     for element in robot:
-        if local(element) in _DIALECTS:
+        if element.tag in _DIALECTS:
             loops.append(_stated_loop(reader, element))
-        elif local(element) == _BALL:
+        elif element.tag == _BALL:
             loops.append(_ball(reader, element, len(loops)))
     poses = world_poses(tree)
     loops += [_gazebo_loop(reader, element, poses, tree.root) for element in robot.findall("gazebo/joint")]
@@ -96,17 +101,14 @@ def _stated_loop(reader: Reader, element: ElementTree.Element) -> Loop:
 
 def _ball(reader: Reader, element: ElementTree.Element, number: int) -> Loop:
     """Return the point that two bodies share."""
-    name = f"{_BALL}_{number + 1}"
     where = f"<{_BALL}>"
-    stated = {local(child).removeprefix(f"{_BALL}_"): child for child in element}
-    for word in ("body_A", "body_B", "p_AP", "p_BQ"):
+    stated = {str(child.tag).removeprefix(f"{_BALL}_"): child for child in element}
+    for word in BALL_WORDS:
         if word not in stated:
             raise reader.fail(where, f"needs <{_BALL}_{word}>")
-    links = [reader.text(stated[word], "name", where) for word in ("body_A", "body_B")]
-    places = [np.eye(4), np.eye(4)]
-    for place, word in zip(places, ("p_AP", "p_BQ"), strict=True):
-        place[:3, 3] = reader.numbers(stated[word], "value", 3, where, None)
-    return Loop(name, "ball", (links[0], links[1]), (places[0], places[1]), np.array(_X))
+    one, two = (reader.text(stated[word], "name", where) for word in BALL_WORDS[:2])
+    first, second = (reader.numbers(stated[word], "value", 3, where, None) for word in BALL_WORDS[2:])
+    return shared_point(f"ball_constraint_{number + 1}", (one, two), (first, second))
 
 
 def _unit(reader: Reader, axis: Array, where: str) -> Array:
@@ -147,7 +149,7 @@ def unread(robot: ElementTree.Element) -> list[str]:
     settings = [child for child in robot.findall("gazebo/*") if child.tag not in _READ_OF_GAZEBO]
     of_gazebo = [f"gazebo {'sensor' if child.tag == 'sensor' else 'setting'}" for child in settings]
     of_gazebo += ["gazebo plugin"] * others(robot.findall("gazebo/plugin"))
-    other = [element for element in robot if local(element) not in _READ]
+    other = [element for element in robot if element.tag not in _READ]
     for path, known in (("link/*", IN_LINK), ("joint/*", IN_JOINT)):
         other += [element for element in robot.findall(path) if local(element) not in known]
     turned = ["axis rpy" for axis in robot.findall("joint/axis") if "rpy" in axis.attrib]

@@ -7,6 +7,7 @@ import re
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class _Builder(ElementTree.TreeBuilder):
         self._depth -= 1
         return super().end(tag)
 
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+    def doctype(self, *_: object) -> None:
         """Refuse the declaration that entity bombs live in."""
         raise FileFormatError(self._path, "has a DOCTYPE or entities, which are not read; remove the declaration")
 
@@ -66,27 +67,25 @@ def parse_xml(path: Path, *, root: str | None, max_bytes: int = MAX_BYTES) -> El
 def parse_text(path: Path, text: bytes, *, roots: tuple[str, ...]) -> ElementTree.Element:
     """Return the root element of a text that came from a file; its tag must be one of `roots`, if there are any.
 
-    A namespace of the root is the one that the format is in, and is taken off all its elements. A declaration that does
-    not stand first, as after a licence in a comment, is passed over, as simulators do.
+    Names are as they are written, with their prefixes, declared or not. An XML declaration that does not stand first,
+    as after a licence in a comment, is passed over. Simulators do both.
 
     Raises:
         FileFormatError: not well formed, hostile, or another kind of file.
     """
-    parser = ElementTree.XMLParser(target=_Builder(path))
+    parser, builder = expat.ParserCreate(), _Builder(path)
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, builder.doctype
     try:
-        parser.feed(text[:1] + _DECLARATION.sub(b"", text[1:]))
-        element = parser.close()
+        parser.Parse(text[:1] + _DECLARATION.sub(b"", text[1:]), True)
+        element = builder.close()
     except FileFormatError:
         raise
-    except (ElementTree.ParseError, LookupError, ValueError, RecursionError) as error:
+    except (expat.ExpatError, LookupError, ValueError, RecursionError) as error:
         raise FileFormatError(path, f"is not well-formed XML ({error})") from error
-    if isinstance(element, ElementTree.Element):
-        namespace, brace, _ = element.tag.rpartition("}")
-        for inside in element.iter():
-            inside.tag = inside.tag.removeprefix(namespace + brace)
-    if not isinstance(element, ElementTree.Element) or (roots and element.tag not in roots):
+    if roots and element.tag not in roots:
         expected = " or ".join(f"<{root}>" for root in roots)
-        raise FileFormatError(path, f"has the root element <{getattr(element, 'tag', None)}>; expected {expected}")
+        raise FileFormatError(path, f"has the root element <{element.tag}>; expected {expected}")
     return element
 
 

@@ -334,6 +334,13 @@ def test_a_joint_may_be_called_like_a_link_and_like_the_world(tmp_path: Path) ->
         np.testing.assert_allclose(ours[link], M, atol=1e-14)
 
 
+@pytest.mark.parametrize("none", ["1e16", "inf", "+Infinity", "1e20", "1.79769e+308"])
+def test_a_limit_beyond_all_motion_is_none(tmp_path: Path, none: str) -> None:
+    text = ARM.replace("<lower>-1</lower><upper>2</upper>", f"<lower>-{none.strip('+')}</lower><upper>{none}</upper>")
+    model = load(tmp_path, text).model
+    assert (-model.lowerPositionLimit[0], model.upperPositionLimit[0]) == (np.finfo(float).max,) * 2
+
+
 def test_an_empty_element_says_nothing(tmp_path: Path) -> None:
     """As <ixy></ixy>, which generators of files write."""
     text = ARM.replace("<ixx>0.1</ixx>", "<ixx>0.1</ixx><ixy></ixy><ixz> </ixz>").replace(
@@ -510,6 +517,39 @@ def test_plugins_state_welds_and_motors(tmp_path: Path) -> None:
     np.testing.assert_allclose(fb.closure_residual(chain, np.zeros(3)), 0.0, atol=1e-15)
 
 
+DRAKE = (
+    "<drake:ball_constraint><drake:ball_constraint_body_A>coupler</drake:ball_constraint_body_A>"
+    "<drake:ball_constraint_body_B>rocker</drake:ball_constraint_body_B><drake:ball_constraint_p_AP>1 0 0"
+    "</drake:ball_constraint_p_AP><drake:ball_constraint_p_BQ>0 1 0</drake:ball_constraint_p_BQ>"
+    "</drake:ball_constraint>"
+)
+WELD = "<drake:weld_constraint><parent>tip</parent><child>end</child></drake:weld_constraint>"
+ENDS = (
+    '<frame name="tip" attached_to="coupler"><pose>1 0 0 0 0 0</pose></frame>'
+    '<frame name="end" attached_to="rocker"><pose>0 1 0 0 0 0</pose></frame>'
+)
+
+
+@pytest.mark.parametrize(("more", "kind"), [(DRAKE, "3d"), (ENDS + WELD, "6d")])
+def test_constraints_of_drake_close_loops(tmp_path: Path, more: str, kind: str) -> None:
+    """Their prefix may be declared or not."""
+    text = FOUR_BAR[: FOUR_BAR.index(LAST)] + more + "</model></sdf>"
+    for declared in ("", ' xmlns:drake="http://drake.mit.edu"'):
+        chain = io.load(write(tmp_path, text.replace('version="1.7"', f'version="1.7"{declared}')))
+        assert [c.kind for c in chain.closures] == [kind]
+        np.testing.assert_allclose(fb.closure_residual(chain, np.zeros(3)), 0.0, atol=1e-15)
+    with pytest.raises(FileFormatError, match=r"needs <drake:ball_constraint_p_BQ>|model ''"):
+        io.load(write(tmp_path, text.replace("p_BQ>", "p_BR>").replace("child>", "chill>")))
+    with pytest.raises(FileFormatError, match=r"Unknown link, joint, frame or model '(end|rocker)s'"):
+        io.load(write(tmp_path, text.replace(">end<", ">ends<").replace(">rocker</drake", ">rockers</drake")))
+
+
+def test_forces_of_drake_that_are_not_read_are_refused(tmp_path: Path) -> None:
+    text = FOUR_BAR.replace("</model>", "<drake:linear_bushing_rpy/></model>")
+    with pytest.raises(FileFormatError, match="<drake:linear_bushing_rpy>: acts on the mechanism and is not read"):
+        io.load(write(tmp_path, text))
+
+
 GEARED = FOUR_BAR.replace(
     LAST,
     '<joint name="g" type="gearbox"><parent>crank</parent><child>rocker</child><gearbox_ratio>2</gearbox_ratio>'
@@ -535,6 +575,7 @@ def test_what_is_beside_the_model_is_told(tmp_path: Path) -> None:
     sensors = ARM.replace(
         '<link name="base">', '<link name="base"><sensor name="s"/><light/><gravity>0</gravity>'
     ).replace("<parent>base</parent>", "<parent>base</parent><sensor name='t'/>")
+    sensors = sensors.replace("<xyz>0 1 1</xyz>", "<xyz>0 1 1</xyz><initial_position>1</initial_position>")
     text = sensors.replace('<model name="arm">', f'{around}<model name="arm"><audio/>').replace(
         "</sdf>", "</world></sdf>"
     )
@@ -542,8 +583,8 @@ def test_what_is_beside_the_model_is_told(tmp_path: Path) -> None:
         load(tmp_path, text)
     (one,) = caught
     told = (
-        "static model 'ground', include of model://sun, light of the world, light, 2 sensors, "
-        "absence of gravity on link 'base', audio"
+        "static model 'ground', include of model://sun, light of the world, light element, 2 sensors, "
+        "absence of gravity on link 'base', audio element, initial position"
     )
     assert sorted(str(one.message).partition("mechanism: ")[2].split(", ")) == sorted(told.split(", "))
 
@@ -591,6 +632,7 @@ BAD = [
     ("</model>", "<include><uri>model://x</uri></include></model>", "<include> of 'model://x': is not read inside"),
     ("</model>", "<frame name='f'/><frame name='f'/></model>", "frame 'f': is the name of a frame already"),
     ("</model>", "<joint name='elbow' type='fixed'/></model>", "joint 'elbow': is the name of a joint already"),
+    (ARM[ARM.index("<link") : ARM.index("</model>")], "", "has no <link>"),
     ("</model>", "<link name='apart'/></model>", "link 'world': no joint leads from it to link apart; join it"),
     (
         '<link name="lower">',

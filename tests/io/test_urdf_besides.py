@@ -149,6 +149,11 @@ def test_what_was_loaded_is_saved_with_its_loops(tmp_path: Path) -> None:
         np.testing.assert_allclose(fb.closure_residual(again, np.zeros(3)), 0.0, atol=1e-15)
 
 
+def test_forces_of_drake_that_are_not_read_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match="<drake:joint>: acts on the mechanism and is not read"):
+        io.load(write(tmp_path, GAZEBO + '<drake:joint name="x" type="ball"/>'))
+
+
 def test_a_file_in_a_namespace_is_read_as_one_without(tmp_path: Path) -> None:
     """As Drake writes its own; what is in another namespace is not URDF."""
     path = write(tmp_path, LOOP_JOINT)
@@ -210,7 +215,10 @@ def test_what_moves_nothing_is_told_in_one_line(tmp_path: Path) -> None:
         (LOOP_JOINT.replace("link2", "link3"), "loop_joint 'c': needs its two links: <link1 link="),
         (LOOP_JOINT.replace('"rocker"', '"rock"'), "joint 'c': Unknown link 'rock'; known: base"),
         (CONSTRAINT.replace('<child link="rocker"/>', ""), "constraint 'c': needs its two links"),
-        (BALL.replace('p_BQ value="1 0 0"', 'p_BR value="1 0 0"'), "<ball_constraint>: needs <ball_constraint_p_BQ>"),
+        (
+            BALL.replace('p_BQ value="1 0 0"', 'p_BR value="1 0 0"'),
+            "<drake:ball_constraint>: needs <drake:ball_constraint_p_BQ>",
+        ),
         (GAZEBO + LINK.format("c_1", 0) + HINGE.format("e", "0 0 0", "0", "base", "c_1"), "needs the name 'c_1' for a"),
         (GAZEBO.replace(">rocker<", ">coupler<"), r"loop\[0\]: .*joins two frames of one body"),
     ],
