@@ -539,7 +539,12 @@ def test_constraints_of_drake_close_loops(tmp_path: Path, more: str, kind: str) 
         assert [c.kind for c in chain.closures] == [kind]
         np.testing.assert_allclose(fb.closure_residual(chain, np.zeros(3)), 0.0, atol=1e-15)
     with pytest.raises(FileFormatError, match=r"needs <drake:ball_constraint_p_BQ>|model ''"):
-        io.load(write(tmp_path, text.replace("p_BQ>", "p_BR>").replace("child>", "chill>")))
+        io.load(
+            write(
+                tmp_path,
+                text.replace("p_BQ>", "p_BR>").replace("<child>end", "<kid>end").replace("end</child>", "end</kid>"),
+            )
+        )
     with pytest.raises(FileFormatError, match=r"Unknown link, joint, frame or model '(end|rocker)s'"):
         io.load(write(tmp_path, text.replace(">end<", ">ends<").replace(">rocker</drake", ">rockers</drake")))
 
