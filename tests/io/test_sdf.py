@@ -124,6 +124,7 @@ SAME = {
         '<frame name="a" attached_to="base"><pose>0.1 0 0 0 0 0</pose></frame><frame name="b" attached_to="a"/>'
         '<link name="upper"><pose relative_to="b">0.1 0 0 0 0 0.5</pose>',
     ),
+    "in a frame, as up to 1.6": ("<pose>0.2 0 1 0 0 0.5</pose>", '<pose frame="base">0.2 0 0 0 0 0.5</pose>'),
     "relative_to the model": ("<pose>0.2 0 1", '<pose relative_to="__model__">0.2 0 1'),
     "degrees": ("<pose>0.2 0 1 0 0 0.5</pose>", f'<pose degrees="true">0.2 0 1 0 0 {float(np.degrees(0.5))!r}</pose>'),
     "quaternion": (
@@ -171,6 +172,18 @@ def test_axes_up_to_version_1_4_are_in_the_axes_of_the_model(tmp_path: Path) -> 
         np.testing.assert_allclose(placed(load(tmp_path, old), q)[link], M, atol=1e-14)
 
 
+def test_the_pose_of_a_model_moves_all_that_is_in_it(tmp_path: Path) -> None:
+    """The outer one's the inner one too; what is said in the axes of the world stays."""
+    start, end = ARM.index('<link name="lower">'), ARM.index('<joint name="foot"')
+    lower = ARM[start:end].replace('name="lower"><pose>', 'name="lower"><pose relative_to="__model__">')
+    text = ARM.replace(ARM[start:end], f'<model name="low">{lower}</model>')
+    text = text.replace("<child>lower</child>", "<child>low::lower</child>")
+    moved = placed(load(tmp_path, text.replace('name="arm">', 'name="arm"><pose>0.3 0 0 0 0 1</pose>')), {})
+    at_zero, X = turned(ARM, {}), pose_of("0.3 0 0 0 0 1")
+    for ours, theirs in (("base", "base"), ("upper", "upper"), ("low::lower", "lower")):
+        np.testing.assert_allclose(moved[ours], X @ at_zero[theirs], atol=1e-15)
+
+
 def test_a_nested_model_is_part_of_the_tree(tmp_path: Path) -> None:
     """Its pose carries its links; names inside are NESTED::NAME outside."""
     start, end = ARM.index('<link name="lower">'), ARM.index('<joint name="foot"')
@@ -183,6 +196,11 @@ def test_a_nested_model_is_part_of_the_tree(tmp_path: Path) -> None:
     whole = text.replace("<child>low::lower</child>", "<child>low</child>")  # the model's first link
     whole = whole.replace("<pose>0.05 0 0 0 0.3 0</pose>", '<pose relative_to="low::lower">0.05 0 0 0 0.3 0</pose>')
     np.testing.assert_allclose(placed(load(tmp_path, whole), q)["low::lower"], turned(ARM, q)["lower"], atol=1e-14)
+    named = whole.replace('name="low">', 'name="low" canonical_link="lower"><link name="ring"/>').replace(
+        "</model></sdf>",
+        '<joint name="on" type="fixed"><parent>low</parent><child>low::ring</child></joint></model></sdf>',
+    )
+    np.testing.assert_allclose(placed(load(tmp_path, named), q)["low::lower"], turned(ARM, q)["lower"], atol=1e-14)
 
 
 def test_a_link_without_joints_is_no_root(tmp_path: Path) -> None:
