@@ -765,3 +765,15 @@ def test_an_open_tree_asks_for_a_sidecar_and_takes_one(tmp_path: Path) -> None:
     (tmp_path / "sidecar.urdf").write_text("<robot/>")  # now it is the sidecar of another one
     with pytest.raises(FileFormatError, match="has no sidecar"):
         io.load(path)
+
+
+def test_a_folder_means_its_model(tmp_path: Path) -> None:
+    """model.sdf among others; a linkage file beside it does not count, nor does the package's own XML."""
+    write(tmp_path, FOUR_BAR, "model.sdf")
+    write(tmp_path, ARM, "other.sdf")
+    (tmp_path / "package.xml").write_text("<package/>")
+    (tmp_path / "four.yaml").write_text("linkage: four\n")
+    assert fb.load(tmp_path).name == "square"
+    (tmp_path / "model.sdf").rename(tmp_path / "mine.sdf")
+    with pytest.raises(FileFormatError, match=r"holds 2 \.sdf files \(mine\.sdf, other\.sdf\); name the one to load"):
+        fb.load(tmp_path)
