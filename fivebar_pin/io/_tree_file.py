@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fivebar_pin._files import MAX_BYTES, read_bounded
+from fivebar_pin.errors import FileFormatError
 from fivebar_pin.io._sdf import read_sdf
 from fivebar_pin.io._stated import Stated
 from fivebar_pin.io._urdf import read_urdf
@@ -28,5 +29,8 @@ def read_tree(path: Path, *, named_loops: bool = False, max_bytes: int = MAX_BYT
     is_xacro = path.suffix.lower() == ".xacro"
     text = expanded(path, max_bytes) if is_xacro else read_bounded(path, max_bytes)
     root = parse_text(path, text, roots=("robot", "sdf"))
+    for element in root.iter():
+        if element.tag.startswith("xacro:"):
+            raise FileFormatError(path, f"holds <{element.tag}>, which xacro expands: give the file the ending .xacro")
     read = read_sdf if root.tag == "sdf" else read_urdf
     return read(path, root, named_loops=named_loops)

@@ -257,7 +257,10 @@ def test_a_joint_turned_round_keeps_its_coordinate(tmp_path: Path, kind: str) ->
     text = ARM.replace('"elbow" type="revolute"', f'"elbow" type="{kind}"')
     text = text.replace("<parent>upper</parent><child>lower</child>", "<parent>lower</parent><child>upper</child>")
     value = np.array([np.cos(0.3), np.sin(0.3)]) if kind == "continuous" else 0.3
-    ours, at_zero = placed(load(tmp_path, text), {"elbow": value}), turned(ARM, {})
+    chain, at_zero = load(tmp_path, text), turned(ARM, {})
+    if kind == "continuous":  # the bounds of a cosine and a sine
+        np.testing.assert_array_equal(chain.model.upperPositionLimit[chain.columns("elbow")[0]], [1.01, 1.01])
+    ours = placed(chain, {"elbow": value})
     X = at_zero["upper"] @ pose_of("0.05 0 0 0 0.3 0")
     step, axis = np.eye(4), 0.3 * np.array([0.0, 1.0, 1.0]) / np.sqrt(2.0)
     if kind == "prismatic":

@@ -81,3 +81,10 @@ def test_a_program_that_does_not_run_is_told(tmp_path: Path, monkeypatch: pytest
         io.load(path)
     with pytest.raises(FileFormatError, match="larger than 10 bytes"):
         io.load(path, max_bytes=10)
+
+
+def test_a_xacro_under_another_ending_is_no_tree(tmp_path: Path) -> None:
+    """Its macros would be missing."""
+    (tmp_path / "bar.urdf").write_text(XACRO)
+    with pytest.raises(FileFormatError, match="holds <xacro:property>, which xacro expands: give the file the ending"):
+        io.load(tmp_path)
