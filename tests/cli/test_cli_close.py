@@ -229,3 +229,12 @@ def test_an_sdf_and_a_xacro_get_their_sidecar(
     chain = fb.load(file)
     assert (len(chain.closures), chain.actuated) == (1, ("a",))
     assert (tmp_path / "square.yaml").read_text().count("loop_A") == loops
+
+
+@pytest.mark.filterwarnings("always::fivebar_pin.errors.LeftOutWarning")
+def test_what_a_file_is_taken_without_is_a_note_of_one_line(tmp_path: Path, capsys) -> None:
+    file = tmp_path / "square.sdf"
+    file.write_text(SQUARE.format(f"{CLOSED}<plugin name='p' filename='p.so'/>"))
+    assert main(["check", str(file)]) == 0
+    told = f"fivebar-pin check: note: {file}: left out, as it does not move the mechanism: plugin\n"
+    assert capsys.readouterr().err == told
