@@ -13,6 +13,7 @@ __all__ = [
     "FiveBarPinError",
     "InfeasibleError",
     "InvalidInputError",
+    "LeftOutWarning",
     "OutputError",
     "SingularityError",
     "SolverError",
@@ -167,6 +168,10 @@ class OutputError(FiveBarPinError):
     def __init__(self, path: object, problem: str) -> None:
         self.path = str(path)
         super().__init__(f"{path}: {problem}")
+
+
+class LeftOutWarning(UserWarning):
+    """A file states things that do not move the mechanism (sensors, cameras), and the chain goes without them."""
 
 
 def _written(value: object) -> str:

@@ -12,17 +12,22 @@ from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
-from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
+from fivebar_pin.errors import FileFormatError, FiveBarPinError
 from fivebar_pin.io._build import build_model
-from fivebar_pin.io._mjcf_equality import Equality, check_tendons
+from fivebar_pin.io._left_out import left_out
+from fivebar_pin.io._mjcf_actuators import driven_joints
+from fivebar_pin.io._mjcf_adjust import adjust_masses
+from fivebar_pin.io._mjcf_assets import Assets
+from fivebar_pin.io._mjcf_equality import Equality
+from fivebar_pin.io._mjcf_include import including
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
+from fivebar_pin.io._mjcf_sections import check_sections, gravity
 from fivebar_pin.io._mjcf_springs import tendon_springs
 from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._sidecar import Sidecar
-from fivebar_pin.io._xml import parse_xml
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["GRAIN", "MASSLESS", "ORDER", "UNBOUNDED", "read_mjcf"]
+__all__ = ["GRAIN", "MASSLESS", "ORDER", "STATED", "UNBOUNDED", "read_mjcf"]
 
 UNBOUNDED, ORDER, MASSLESS = "unbounded ", "joint order", "massless "
 """Names of <custom><numeric> entries that our writer makes.
@@ -33,19 +38,8 @@ another; a body whose mass of one `GRAIN` stands for none.
 GRAIN = 1e-14
 """Mass and moments of inertia that a moving body without any is written with: ten times MuJoCo's least [kg, kg m2]."""
 
-_SECTIONS = (
-    "actuator", "asset", "compiler", "contact", "custom", "default", "equality", "keyframe", "option", "sensor", "size",
-    "statistic", "tendon", "visual", "worldbody",
-)  # fmt: skip
-_REFUSED = {
-    "deformable": "deformable bodies are not supported",
-    "include": "included files are not read; merge them into this one",
-    "extension": "plugins are not supported",
-}
-_DRIVES = (
-    "adhesion", "cylinder", "damper", "dcmotor", "general", "intvelocity", "motor", "muscle", "plugin", "position",
-    "velocity",
-)  # fmt: skip
+STATED = "qpos0"
+"""MuJoCo's name for the configuration in which the file places the bodies."""
 _WIDTHS = {"JointModelSpherical": 4, "JointModelFreeFlyer": 7}
 
 
@@ -63,66 +57,43 @@ def read_mjcf(
     springs of joints, and spatial tendons between two sites as springs. Contacts, cameras, lights and sensors are not
     part of a mechanism and are passed over. Whatever else acts on it is refused by name.
     """
-    root = parse_xml(path, root="mujoco", max_bytes=max_bytes)
-    reader = MjcfReader(path, root)
-    _check_sections(reader, root)
-    check_tendons(reader, root)
-    bodies = BodyTree(reader, _meshes(reader, root))
+    root, sources = including(path, max_bytes=max_bytes)
+    reader = MjcfReader(path, root, sources)
+    check_sections(reader, root)
+    bodies = BodyTree(reader, Assets(reader, root))
     for worldbody in root.findall("worldbody"):
         bodies.world(worldbody)
+    adjust_masses(reader, bodies)
     if not bodies.order:
         raise FileFormatError(path, "has no joint in its <worldbody>")
     _unbounded(reader, root, bodies)
     _massless(reader, root, bodies)
     found = Equality(reader, root, bodies).closures() if closures is None else closures
-    driven = _actuated(reader, root, bodies) if actuated is None else actuated
+    driven = driven_joints(reader, root, bodies, found) if actuated is None else actuated
     tree = bodies.tree(root.get("model") or path.stem)
-    sidecar = Sidecar(gravity=_gravity(reader, root), joint_order=_order(reader, root, bodies), joint_data=bodies.data)
+    sidecar = Sidecar(gravity=gravity(reader, root), joint_order=_order(reader, root, bodies), joint_data=bodies.data)
     model = build_model(tree, sidecar, free_flyer=False, urdf=path, beside=path)
+    _stated_pose(model, bodies)
     _keyframes(reader, root, model, bodies.order)
     springs: tuple[Spring | JointSpring, ...] = (*tendon_springs(reader, root, bodies, model), *bodies.springs)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     try:
-        return ClosedChain(model, found, driven, name=tree.name, visuals=visuals, springs=springs)
+        chain = ClosedChain(model, found, driven, name=tree.name, visuals=visuals, springs=springs)
     except FiveBarPinError as error:
         if closures is not None or actuated is not None:
             raise
         raise FileFormatError(path, str(error)) from error
+    left_out(path, reader.left_out)
+    return chain
 
 
-def _check_sections(reader: MjcfReader, root: ElementTree.Element) -> None:
-    for section in root:
-        if section.tag in _REFUSED and (len(section) or section.tag == "include"):
-            raise reader.fail(f"<{section.tag}>", _REFUSED[section.tag])
-        if section.tag not in _SECTIONS and section.tag not in _REFUSED:
-            raise reader.fail("<mujoco>", str(UnknownNameError("section", section.tag, (*_SECTIONS, *_REFUSED))))
-    for element in root.iter("include"):
-        raise reader.fail(f"<{element.tag}>", _REFUSED["include"])
-    for word in ("boundmass", "boundinertia", "settotalmass", "balanceinertia", "inertiagrouprange"):
-        if reader.compiler.get(word, "0").split()[:1] not in (["0"], ["false"], ["-1"], ["0.0"]):
-            raise reader.fail("<compiler>", f"{word} is not supported; state the masses and inertias themselves")
-    if reader.compiler.get("coordinate", "local") != "local":
-        raise reader.fail("<compiler>", "global coordinates are not supported; write local ones")
-    if reader.compiler.get("inertiafromgeom", "auto") not in ("auto", "true", "false"):
-        raise reader.fail("<compiler>", "inertiafromgeom must be auto, true or false")
-    option = reader.merged(root.findall("option"))
-    for word in ("density", "viscosity", "wind"):
-        if any(reader.number(x, word, "<option>") for x in option.get(word, "").split()):
-            raise reader.fail("<option>", f"{word}: forces of a fluid are not supported; remove it")
-
-
-def _gravity(reader: MjcfReader, root: ElementTree.Element) -> tuple[float, ...]:
-    option = ElementTree.Element("option", reader.merged(root.findall("option")))
-    return tuple(reader.numbers(option, "gravity", 3, "<option>", [0.0, 0.0, -9.81]))
-
-
-def _meshes(reader: MjcfReader, root: ElementTree.Element) -> dict[str, str]:
-    folder = reader.path.parent / reader.compiler.get("meshdir", reader.compiler.get("assetdir", ""))
-    meshes = {}
-    for mesh in root.findall("asset/mesh"):
-        file = mesh.get("file", "")
-        meshes[mesh.get("name") or Path(file).stem] = str(folder / file) if file else ""
-    return meshes
+def _stated_pose(model: pin.Model, bodies: BodyTree) -> None:
+    """Keep where the file places its joints as a reference configuration, where it is not the neutral one."""
+    if any(bodies.refs.values()):
+        q = pin.neutral(model)
+        for joint, ref in bodies.refs.items():
+            q[model.idx_qs[model.getJointId(joint)]] = ref
+        model.referenceConfigurations[STATED] = q
 
 
 def _order(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> tuple[str, ...]:
@@ -168,24 +139,6 @@ def _massless(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -
             bodies.links[link] = replace(bodies.links[link], inertia=None)
 
 
-def _actuated(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> tuple[str, ...]:
-    names: list[str] = []
-    for actuator in root.findall("actuator/*"):
-        where = f"{actuator.tag} {actuator.get('name', '')!r}"
-        if actuator.tag not in _DRIVES:
-            raise reader.fail(where, str(UnknownNameError("actuator", actuator.tag, _DRIVES)))
-        joint = actuator.get("joint") or actuator.get("jointinparent")
-        if joint is None:
-            raise reader.fail(where, "drives no joint; only actuators with joint= are supported")
-        if joint not in bodies.order:
-            raise reader.fail(where, str(UnknownNameError("joint", joint, bodies.order)))
-        if bodies.joints[joint].kind not in ("revolute", "prismatic", "continuous"):
-            raise reader.fail(where, f"drives {joint!r}, which has several degrees of freedom; a motor drives one")
-        if joint not in names:
-            names.append(joint)
-    return tuple(names)
-
-
 def _keyframes(reader: MjcfReader, root: ElementTree.Element, model: pin.Model, order: list[str]) -> None:
     """Keep keyframes as reference configurations, quaternions turned from (w, x, y, z) to (x, y, z, w)."""
     size = sum(
@@ -208,7 +161,8 @@ def _from_qpos(reader: MjcfReader, model: pin.Model, qpos: Array, order: list[st
         if take == 1:
             parts[j] = np.array([np.cos(mine[0]), np.sin(mine[0])]) if model.nqs[j] == 2 else mine
             continue
-        quaternion = reader.unit(mine[-4:], "qpos", where)
+        stated = mine[-4:] if np.any(mine[-4:]) else np.array([1.0, 0.0, 0.0, 0.0])  # as MuJoCo normalises it
+        quaternion = reader.unit(stated, "qpos", where)
         if take == 7:
             world = pin.SE3(homogeneous(mine[:3], quaternion_matrix(quaternion)))
             parts[j] = pin.SE3ToXYZQUAT(model.jointPlacements[j].actInv(world))

@@ -6,7 +6,8 @@
     tendon, of fixed ones coupling of any number of joints, sum of coef q = a_0 (+ a_1 times the other tendon)
     tendon, of a spatial  distance, where the tendon joins two sites and nothing else
 
-MuJoCo counts joints and tendons from the configuration of the file, in which every joint is at zero.
+MuJoCo counts joints and tendons from the configuration of the file, in which a joint is at its `ref`.
+Equalities that are not active are told and left out.
 """
 
 from __future__ import annotations
@@ -22,27 +23,13 @@ from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameErro
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
 from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
 
-__all__ = ["FACTOR", "HINGE", "Equality", "check_tendons"]
+__all__ = ["FACTOR", "HINGE", "Equality", "fixed_ratios"]
 
 HINGE, FACTOR = "revolute closure ", "coupling factor "
 """Names of <custom><numeric> entries that our writer makes.
 
 The axis of a hinge made of two connects; what the row of a joint equality, whose first ratio is one, is multiplied by.
 """
-
-_ACTING = (
-    "stiffness", "damping", "frictionloss", "armature", "limited", "range", "actuatorfrclimited", "actuatorfrcrange",
-)  # fmt: skip
-
-
-def check_tendons(reader: MjcfReader, root: ElementTree.Element) -> None:
-    """Refuse fixed tendons that act by themselves: they only couple joints. Spatial ones may be springs."""
-    for element in root.findall("tendon/fixed"):
-        full = reader.with_defaults(ElementTree.Element("tendon", element.attrib), None)
-        for word in _ACTING:
-            if full.get(word, "0").split()[:1] not in (["0"], ["0.0"], ["false"], ["auto"]):
-                where = f"{element.tag} {element.get('name', '')!r}"
-                raise reader.fail(where, f"{word} of a tendon is not supported; remove it or model it as a force")
 
 
 class Equality:
@@ -70,7 +57,7 @@ class Equality:
             "connect": self.connect,
             "joint": self.joint,
             "tendon": self.tendon,
-            "weld": lambda element, name, where: Weld(self.frames(element, name, where), name=name),
+            "weld": self.glue,
         }
         closures: list[Closure] = []
         for k, element in enumerate(self.elements):
@@ -79,8 +66,9 @@ class Equality:
             if element.tag not in kinds:
                 raise self.reader.fail(where, str(UnknownNameError("equality", element.tag, kinds)) + " Remove it.")
             full = self.reader.with_defaults(_apart(element), None)
-            if full.get("active", "true") != "true":
-                raise self.reader.fail(where, "is not active; remove it or make it active")
+            if self.reader.flag(full, "active", where, "true") != "true":
+                self.reader.left_out.append(f"{where}, which is not active")
+                continue
             if name.endswith(" axis") and name[: -len(" axis")] in self.hinges:
                 continue
             try:
@@ -99,6 +87,12 @@ class Equality:
             raise self.reader.fail(where, f"is marked as a hinge but lacks its second connect {name + ' axis'!r}")
         return Revolute(frames, axis, name=name)
 
+    def glue(self, element: ElementTree.Element, name: str, where: str) -> Closure:
+        """A weld whose turns are weighed by nothing holds its point alone; any other weight holds them too."""
+        (turns,) = self.reader.numbers(element, "torquescale", 1, where, [1.0])
+        frames = self.frames(element, name, where)
+        return Weld(frames, name=name) if turns else Point(frames, name=name)
+
     def joint(self, element: ElementTree.Element, name: str, where: str) -> Coupling:
         """q_1 = a_0 + a_1 q_2, times the factor that our writer noted."""
         joints = [element.get(word) for word in ("joint1", "joint2")]
@@ -108,7 +102,12 @@ class Equality:
         a0, a1 = self.linear(element, where)
         (factor,) = self.factors.get(name, [1.0])
         other = {str(joints[1]): -a1 * factor} if joints[1] and a1 else {}
-        return Coupling({str(joints[0]): factor, **other}, a0 * factor, name=name)
+        return self.coupling({str(joints[0]): factor, **other}, a0 * factor, name)
+
+    def coupling(self, ratios: dict[str, float], offset: float, name: str) -> Coupling:
+        """Return the coupling that MuJoCo counts from where the file places the joints."""
+        at_rest = sum(ratio * self.bodies.refs.get(joint, 0.0) for joint, ratio in ratios.items())
+        return Coupling(ratios, offset + at_rest, name=name)
 
     def tendon(self, element: ElementTree.Element, name: str, where: str) -> Closure:
         a0, a1 = self.linear(element, where)
@@ -121,23 +120,11 @@ class Equality:
             raise self.reader.fail(where, "needs the attribute 'tendon1'")
         if one.tag == "spatial":
             return self.rod(one, name, where, a0, second)
-        ratios = self.ratios(one, where)
-        for joint, c in self.ratios(self.tendons[second], where).items() if second else ():
+        ratios = fixed_ratios(self.reader, self.bodies, one, where)
+        other = fixed_ratios(self.reader, self.bodies, self.tendons[second], where) if second else {}
+        for joint, c in other.items():
             ratios[joint] = ratios.get(joint, 0.0) - a1 * c
-        return Coupling({joint: c for joint, c in ratios.items() if c}, a0, name=name)
-
-    def ratios(self, tendon: ElementTree.Element, where: str) -> dict[str, float]:
-        """Return the coefficients of a fixed tendon by joint."""
-        if tendon.tag != "fixed":
-            raise self.reader.fail(where, f"ties a {tendon.tag} tendon to another; only fixed ones can be coupled")
-        ratios: dict[str, float] = {}
-        for joint in tendon:
-            name = self.reader.text(joint, "joint", f"fixed {tendon.get('name', '')!r}")
-            if name not in self.bodies.order:
-                raise self.reader.fail(where, str(UnknownNameError("joint", name, self.bodies.order)))
-            (c,) = self.reader.numbers(joint, "coef", 1, where, None)
-            ratios[name] = ratios.get(name, 0.0) + c
-        return ratios
+        return self.coupling({joint: c for joint, c in ratios.items() if c}, a0, name)
 
     def rod(self, tendon: ElementTree.Element, name: str, where: str, longer: float, second: str | None) -> Distance:
         """Return the distance that a straight tendon between two sites is held at: its length at zero, and a_0."""
@@ -194,6 +181,20 @@ class Equality:
         if np.any(values[3:]):
             return homogeneous(values[:3], quaternion_matrix(self.reader.unit(values[3:], "relpose", where))), anchor
         return np.linalg.inv(first) @ second @ anchor, anchor
+
+
+def fixed_ratios(reader: MjcfReader, bodies: BodyTree, tendon: ElementTree.Element, where: str) -> dict[str, float]:
+    """Return the coefficients of a fixed tendon by joint."""
+    if tendon.tag != "fixed":
+        raise reader.fail(where, f"ties a {tendon.tag} tendon to another; only fixed ones can be coupled")
+    ratios: dict[str, float] = {}
+    for joint in tendon:
+        name = reader.text(joint, "joint", f"fixed {tendon.get('name', '')!r}")
+        if name not in bodies.order:
+            raise reader.fail(where, str(UnknownNameError("joint", name, bodies.order)))
+        (c,) = reader.numbers(joint, "coef", 1, where, None)
+        ratios[name] = ratios.get(name, 0.0) + c
+    return ratios
 
 
 def _apart(element: ElementTree.Element) -> ElementTree.Element:

@@ -10,12 +10,15 @@ import pinocchio as pin
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.io._build import bare_inertia
+from fivebar_pin.io._mjcf_assets import Assets
+from fivebar_pin.io._mjcf_meshes import mesh_inertia
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, shortest_turn
 
 __all__ = ["geom_inertia", "geom_shape", "stated_inertia"]
 
 SOLIDS = ("box", "capsule", "cylinder", "ellipsoid", "sphere")
 WITHOUT_MASS = ("hfield", "plane")
+_KINDS = (*SOLIDS, *WITHOUT_MASS, "mesh", "sdf")
 _SIZES = {"box": 3, "ellipsoid": 3, "sphere": 1, "capsule": 2, "cylinder": 2}
 
 
@@ -46,9 +49,9 @@ def stated_inertia(reader: MjcfReader, inertial: ElementTree.Element, where: str
 def geom_shape(reader: MjcfReader, geom: ElementTree.Element, where: str) -> tuple[str, list[float], Array]:
     """Return a geom's kind, its sizes (half lengths, as MJCF has them) and its pose in the body."""
     kind = geom.get("type", "mesh" if "mesh" in geom.attrib else "sphere")
-    if kind not in (*SOLIDS, *WITHOUT_MASS, "mesh"):
-        raise reader.fail(where, str(UnknownNameError("geom type", kind, (*SOLIDS, *WITHOUT_MASS, "mesh"))))
-    if kind not in SOLIDS:
+    if kind not in _KINDS:
+        raise reader.fail(where, str(UnknownNameError("geom type", kind, _KINDS)))
+    if kind not in SOLIDS or "mesh" in geom.attrib:
         return kind, [], reader.pose(geom, where)
     count = _SIZES[kind]
     if "fromto" in geom.attrib:
@@ -59,7 +62,8 @@ def geom_shape(reader: MjcfReader, geom: ElementTree.Element, where: str) -> tup
         along = ends[0] - ends[1]
         length = float(np.linalg.norm(along))
         z = reader.unit(along, "fromto", where)
-        return kind, [*sizes, 0.5 * length], homogeneous(0.5 * (ends[0] + ends[1]), shortest_turn(z))
+        M = homogeneous(0.5 * (ends[0] + ends[1]), shortest_turn(z))
+        return kind, [*sizes, 0.5 * length], reader.frame(geom) @ M
     return kind, _sizes(reader, geom, count, where), reader.pose(geom, where)
 
 
@@ -73,23 +77,36 @@ def _sizes(reader: MjcfReader, geom: ElementTree.Element, count: int, where: str
     return sizes
 
 
-def geom_inertia(reader: MjcfReader, geom: ElementTree.Element, where: str) -> pin.Inertia | None:
-    """Return the inertia of a solid geom in body axes, None for one without mass."""
+def geom_inertia(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, where: str) -> pin.Inertia | None:
+    """Return the inertia of a solid geom or a mesh in body axes, None for one without mass."""
     kind, sizes, M = geom_shape(reader, geom, where)
     (density,) = reader.numbers(geom, "density", 1, where, [1000.0])
     stated = reader.numbers(geom, "mass", 1, where, [-1.0])[0] if "mass" in geom.attrib else None
     if kind in WITHOUT_MASS or stated == 0.0 or (stated is None and density == 0.0):
         return None
-    if kind == "mesh":
-        raise reader.fail(where, "has its mass from a mesh, which is not read; state <inertial> in the body")
     if reader.flag(geom, "shellinertia", where, "false") != "false":
         raise reader.fail(where, "shellinertia is not supported; state <inertial> in the body")
-    volume, unit = _solid(kind, sizes)
-    mass = density * volume if stated is None else stated
-    if mass < 0.0:
-        raise reader.fail(where, f"mass = {mass!r} must not be negative [kg]")
-    inertia = bare_inertia(mass, np.zeros(3), np.diag(mass * unit))
-    return pin.SE3(M).act(inertia)
+    if "mesh" in geom.attrib:
+        inertia = _of_mesh(reader, assets, geom, kind, where)
+    else:
+        volume, unit = _solid(kind, sizes)
+        inertia = bare_inertia(volume, np.zeros(3), np.diag(volume * unit))
+    factor = density if stated is None else stated / inertia.mass
+    if factor < 0.0:
+        raise reader.fail(where, f"mass = {factor * inertia.mass!r} must not be negative [kg]")
+    dense = bare_inertia(factor * inertia.mass, inertia.lever, factor * np.array(inertia.inertia))
+    return pin.SE3(M).act(dense)
+
+
+def _of_mesh(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, kind: str, where: str) -> pin.Inertia:
+    """Return the inertia of a mesh of density one."""
+    mesh, way_out = assets.find(geom, where), 'state <inertial> in the body, or mass="0"'
+    if kind != "mesh":
+        raise reader.fail(where, f"has its mass from a {kind} around a mesh, which is not supported; {way_out}")
+    try:
+        return mesh_inertia(mesh)
+    except ValueError as error:
+        raise reader.fail(where, f"has its mass from mesh {geom.get('mesh')!r}, which {error}; {way_out}") from error
 
 
 def _solid(kind: str, sizes: list[float]) -> tuple[float, Array]:

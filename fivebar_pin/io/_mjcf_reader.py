@@ -2,67 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.errors import UnknownNameError
+from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.io._mjcf_attributes import DRIVES, KNOWN
 from fivebar_pin.io._xml import Reader, direction
 
-__all__ = ["KNOWN", "MjcfReader", "homogeneous", "shortest_turn"]
+__all__ = ["MjcfReader", "homogeneous", "quaternion_matrix", "shortest_turn", "turn"]
 
 _ALONG = 1e-10  # sine of an angle to the z axis below which any axis across serves [-]
 
-_POSE = "pos quat axisangle xyaxes zaxis euler"
-_ATTRIBUTES = f"""
-body      name childclass {_POSE} mocap gravcomp user sleep
-joint     name class type group pos axis springdamper limited actuatorfrclimited solreflimit solimplimit
-          solreffriction solimpfriction stiffness range actuatorfrcrange actuatorgravcomp margin ref springref
-          armature damping frictionloss user
-freejoint name group align
-inertial  {_POSE} mass diaginertia fullinertia
-geom      name class type contype conaffinity condim group priority size material rgba friction mass density
-          {_POSE} shellinertia solmix solref solimp margin gap fromto hfield mesh fitscale fluidshape fluidcoef user
-site      name class type group {_POSE} material size fromto rgba user
-connect   name class active solref solimp body1 body2 anchor site1 site2
-weld      name class active solref solimp body1 body2 relpose anchor site1 site2 torquescale
-joint_equality   name class active solref solimp joint1 joint2 polycoef
-tendon_equality  name class active solref solimp tendon1 tendon2 polycoef
-tendon    name class group limited range solreflimit solimplimit solreffriction solimpfriction margin frictionloss
-          springlength stiffness damping armature actuatorfrclimited actuatorfrcrange width material rgba user
-"""
-
-
-def _table(text: str) -> dict[str, list[str]]:
-    table: dict[str, list[str]] = {}
-    for line in text.strip().splitlines():
-        words = line.split()
-        if line[0] != " ":
-            table[words.pop(0)] = words
-        else:
-            table[list(table)[-1]] += words
-    return table
-
-
-KNOWN = _table(_ATTRIBUTES)
-"""Attributes that an element may have; another one is an error, so that no misspelt value is silently a default."""
-
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
+
+
+FRAME = " frame"
+"""Attribute for the number of the frame that stood around an element: no file can state one with a blank."""
+
+
+_FAMILIES = {
+    **dict.fromkeys(DRIVES, "actuator"),
+    **dict.fromkeys(("connect", "weld", "joint_equality", "tendon_equality"), "equality"),
+    **dict.fromkeys(("fixed", "spatial"), "tendon"),
+}
+"""Under what the defaults of elements are kept that share them."""
 
 
 class MjcfReader(Reader):
     """Reads elements of one MJCF file.
 
     Attributes:
+        left_out: what the chain goes without, see `_left_out`.
+        frames: poses of the <frame> elements in their bodies, the first that of none (4, 4).
+        sources: file of each named element that came with an included one.
         degrees: angles are in degrees (MJCF's own default).
         eulerseq: axes of Euler angles, lower case turning with the body, upper case fixed.
         defaults: attributes by default class and tag.
     """
 
-    def __init__(self, path: Path, root: ElementTree.Element) -> None:
+    def __init__(self, path: Path, root: ElementTree.Element, sources: Mapping[str, Path]) -> None:
         super().__init__(path)
+        self.sources = sources
+        self.left_out: list[str] = []
+        self.frames = [np.eye(4)]
         compiler = self.merged(root.findall("compiler"))
         angle = compiler.get("angle", "degree")
         if angle not in ("degree", "radian"):
@@ -74,7 +60,17 @@ class MjcfReader(Reader):
         self.compiler = compiler
         self.defaults: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for default in root.findall("default"):
-            self._read_defaults(default, default.get("class", "main"), {}, top=True)
+            name = default.get("class", "main")
+            if default is not root.find("default") and name != "main":
+                raise self.fail(
+                    f"default {name!r}", "is a class of its own at the top; put it into the first <default>"
+                )
+            self._read_defaults(default, name, self.defaults["main"], top=True)
+
+    def fail(self, where: str, problem: str) -> FileFormatError:
+        """Return the error for an element, which names the file that the element stands in."""
+        file = next((file for key, file in self.sources.items() if where.endswith(key)), self.path)
+        return FileFormatError(file, f"{where}: {problem}")
 
     def merged(self, elements: list[ElementTree.Element]) -> dict[str, str]:
         """Return the attributes of sections that may come several times."""
@@ -86,7 +82,7 @@ class MjcfReader(Reader):
         mine = {tag: dict(attributes) for tag, attributes in above.items()}
         for child in default:
             if child.tag != "default":
-                mine.setdefault(child.tag, {}).update(child.attrib)
+                mine.setdefault(_FAMILIES.get(child.tag, child.tag), {}).update(child.attrib)
         self.defaults[name] = mine
         if top:
             self.defaults["main"] = mine
@@ -99,7 +95,8 @@ class MjcfReader(Reader):
         name = element.get("class") or childclass or "main"
         if name not in self.defaults:
             raise self.fail(where, str(UnknownNameError("default class", name, self.defaults)))
-        full = ElementTree.Element(element.tag, {**self.defaults[name].get(element.tag, {}), **element.attrib})
+        defaults = self.defaults[name].get(_FAMILIES.get(element.tag, element.tag), {})
+        full = ElementTree.Element(element.tag, {**defaults, **element.attrib})
         if any(word in element.attrib for word in _ORIENTATIONS):
             for word in _ORIENTATIONS:
                 if word not in element.attrib:
@@ -109,10 +106,10 @@ class MjcfReader(Reader):
 
     def check_known(self, element: ElementTree.Element, where: str) -> None:
         """Refuse attributes that this element does not have."""
+        known = KNOWN[element.tag if element.tag in KNOWN else _FAMILIES[element.tag]]
         for attribute in element.attrib:
-            if attribute not in KNOWN[element.tag]:
-                problem = UnknownNameError(f"attribute of <{element.tag}>", attribute, KNOWN[element.tag])
-                raise self.fail(where, str(problem))
+            if attribute not in known and attribute != FRAME:
+                raise self.fail(where, str(UnknownNameError(f"attribute of <{element.tag}>", attribute, known)))
 
     def flag(self, element: ElementTree.Element, attribute: str, where: str, default: str) -> str:
         """Return "true", "false" or "auto"."""
@@ -122,9 +119,45 @@ class MjcfReader(Reader):
         return value
 
     def pose(self, element: ElementTree.Element, where: str) -> Array:
-        """Return the pose that pos and one of the orientation attributes state, homogeneous (4, 4)."""
+        """Return the pose that pos and one of the orientation attributes state, homogeneous (4, 4).
+
+        It is that in the body, whatever frames stand around the element.
+        """
         position = np.array(self.numbers(element, "pos", 3, where, [0.0, 0.0, 0.0]))
-        return homogeneous(position, self.rotation(element, where))
+        return self.frame(element) @ homogeneous(position, self.rotation(element, where))
+
+    def frame(self, element: ElementTree.Element) -> Array:
+        """Return the pose in the body of the frames that stand around an element, homogeneous (4, 4)."""
+        return self.frames[int(element.get(FRAME, "0"))]
+
+    def without_frames(self, body: ElementTree.Element) -> None:
+        """Put what stands in the frames of a body, and of those in it, into the body, and keep where they are."""
+        children: list[ElementTree.Element] = []
+        for child in body:
+            children += self._out_of_frame(child, 0, None) if child.tag == "frame" else [child]
+        body[:] = children
+        for child in body.findall("body"):
+            self.without_frames(child)
+
+    def _out_of_frame(
+        self, frame: ElementTree.Element, above: int, childclass: str | None
+    ) -> list[ElementTree.Element]:
+        where = f"frame {frame.get('name', '')!r}"
+        self.check_known(frame, where)
+        frame.set(FRAME, str(above))
+        self.frames.append(self.pose(frame, where))
+        mine, childclass = len(self.frames) - 1, frame.get("childclass", childclass)
+        children: list[ElementTree.Element] = []
+        for child in frame:
+            if child.tag == "frame":
+                children += self._out_of_frame(child, mine, childclass)
+                continue
+            child.set(FRAME, str(mine))
+            word = "childclass" if child.tag == "body" else "class"
+            if childclass is not None and word not in child.attrib and word in KNOWN.get(child.tag, ()):
+                child.set(word, childclass)
+            children.append(child)
+        return children
 
     def rotation(self, element: ElementTree.Element, where: str) -> Array:
         """Return the rotation matrix of an element."""

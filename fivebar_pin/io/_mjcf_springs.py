@@ -1,7 +1,8 @@
-"""Springs in MJCF: spatial tendons between two sites, and the springs of hinges and slides.
+"""Springs in MJCF: spatial tendons between two sites, fixed tendons of one joint, and the springs of hinges and slides.
 
 MuJoCo's tendon pulls with k (L - l) + c dL/dt and its joint with -k (q - rest) - b dq/dt: the laws of `Spring` and
-`JointSpring`. It has one damper for a joint: that of a joint's spring is read back as the joint's own.
+`JointSpring`. A fixed tendon of one joint has L = r q, and so the joint's spring r^2 k, r^2 c, resting at l / r. MuJoCo
+has one damper for a joint: that of a joint's spring is read back as the joint's own.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import pinocchio as pin
 
 from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
+from fivebar_pin.io._mjcf_equality import fixed_ratios
 from fivebar_pin.io._mjcf_reader import MjcfReader
 from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._urdf_text import numbers, quoted
@@ -29,25 +31,31 @@ _URDF_ONLY = "Save it as URDF only: formats=('urdf',)."
 
 def tendon_springs(
     reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree, model: pin.Model
-) -> tuple[Spring, ...]:
-    """Return the springs that the tendons of a file are; tendons that do nothing are passed over."""
-    springs = []
+) -> tuple[Spring | JointSpring, ...]:
+    """Return the springs that the tendons of a file are, and note the tendons that nothing acts in or through."""
+    springs: list[Spring | JointSpring] = []
+    used = {user.get(word) for user in root.iter() for word in ("tendon", "tendon1", "tendon2")}
     for k, element in enumerate(root.findall("tendon/*")):
         where = f"{element.tag} {element.get('name', str(k))!r}"
-        if element.tag == "fixed":
-            continue  # it couples joints, see `_mjcf_equality`
-        if element.tag != "spatial":
+        if element.tag not in ("fixed", "spatial"):
             raise reader.fail(where, str(UnknownNameError("tendon", element.tag, ("fixed", "spatial"))))
-        full = reader.with_defaults(ElementTree.Element("tendon", element.attrib), None)
-        _check_spring_alone(reader, full, where)
+        full = reader.with_defaults(element, None)
+        _check_spring_alone(reader, bodies, full, where)
         (stiffness,), (damping,) = (reader.numbers(full, w, 1, where, [0.0]) for w in ("stiffness", "damping"))
         if not stiffness and not damping:
+            if element.get("name", "") not in used:
+                reader.left_out.append("idle tendon")
             continue
-        ends = _sites(reader, element, bodies, where)
+        length = _stated_length(reader, full, where)
         try:
-            stated = _stated_length(reader, full, where)
-            length = _relaxed_length(model, bodies.rests, ends) if stated == _AUTOMATIC else stated
-            springs.append(Spring(*ends, stiffness, length, damping))
+            if element.tag == "spatial":
+                ends = _sites(reader, element, bodies, where)
+                relaxed = _relaxed_length(model, bodies.rests, ends) if length == _AUTOMATIC else length
+                springs.append(Spring(*ends, stiffness, relaxed, damping))
+            else:
+                joint, r = _only_joint(reader, element, bodies, where)
+                rest = bodies.rests[joint] if length == _AUTOMATIC else length / r
+                springs.append(JointSpring(joint, r * r * stiffness, rest, r * r * damping))
         except FileFormatError:
             raise
         except FiveBarPinError as error:
@@ -85,15 +93,27 @@ def tendon_lines(chain: ClosedChain, site: Callable[[str], str]) -> list[str]:
     return lines
 
 
-def _check_spring_alone(reader: MjcfReader, full: ElementTree.Element, where: str) -> None:
+def _check_spring_alone(reader: MjcfReader, bodies: BodyTree, full: ElementTree.Element, where: str) -> None:
     """Refuse whatever else than a spring and a damper acts in a tendon."""
-    for limited, bounds in (("limited", "range"), ("actuatorfrclimited", "actuatorfrcrange")):
-        stated = reader.flag(full, limited, where, "auto")
-        if stated == "true" or (stated == "auto" and bounds in full.attrib):
-            raise reader.fail(where, f"{bounds}: limits of tendons are not supported; remove it")
-    for word in ("frictionloss", "armature"):
+    if bodies.limited(full, "limited", "range", where):
+        raise reader.fail(where, "range: limits of tendons are not supported; remove it, or state an <equality>")
+    for word in ("frictionloss", "armature", "springyield"):
         if reader.numbers(full, word, 1, where, [0.0])[0]:
             raise reader.fail(where, f"{word} of tendons is not supported; remove it")
+    if bodies.limited(full, "actuatorfrclimited", "actuatorfrcrange", where):
+        reader.left_out.append(f"actuatorfrcrange of {where}")
+
+
+def _only_joint(reader: MjcfReader, element: ElementTree.Element, bodies: BodyTree, where: str) -> tuple[str, float]:
+    """Return the joint of a fixed tendon and its coefficient."""
+    ratios = {joint: r for joint, r in fixed_ratios(reader, bodies, element, where).items() if r}
+    if len(ratios) != 1:
+        rule = f"stiffness and damping across {len(ratios)} joints are not supported; state them at the joints"
+        raise reader.fail(where, rule)
+    ((joint, r),) = ratios.items()
+    if joint not in bodies.rests:
+        raise reader.fail(where, f"is a spring on {joint!r}, which has several degrees of freedom")
+    return joint, r
 
 
 def _sites(reader: MjcfReader, element: ElementTree.Element, bodies: BodyTree, where: str) -> tuple[str, str]:

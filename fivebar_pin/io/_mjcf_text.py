@@ -46,7 +46,7 @@ class _Writer:
     def __init__(self, chain: ClosedChain, folder: Path) -> None:
         self.chain, self.model, self.folder = chain, chain.model, folder
         self.tree: TreeEntry = outline(chain)
-        self.meshes: dict[str, str] = {}
+        self.meshes: dict[tuple[str, tuple[float, ...]], str] = {}
         self.below: dict[str, list[JointEntry]] = {}
         for joint in self.tree.joints.values():
             self.below.setdefault(joint.parent, []).append(joint)
@@ -66,7 +66,7 @@ class _Writer:
             self.numeric.append(f'    <numeric name="{ORDER}" data="{places}"/>')
         motors = [f"    <motor name={quoted(a)} joint={quoted(a)}/>" for a in self.chain.actuated]
         gravity = numbers(self.model.gravity.linear)
-        meshes = [f"    <mesh name={quoted(n)} file={quoted(f)}/>" for f, n in self.meshes.items()]
+        meshes = [f"    <mesh name={quoted(n)} file={quoted(f)}{_scale(s)}/>" for (f, s), n in self.meshes.items()]
         lines = [
             '<?xml version="1.0" encoding="utf-8"?>',
             f"<mujoco model={quoted(self.tree.name)}>",
@@ -221,8 +221,8 @@ class _Writer:
         elif visual.shape == "sphere":
             shape = f'type="sphere" size="{numbers(size)}"'
         elif visual.shape == "mesh":
-            file = mesh_name(visual.mesh, self.folder)
-            shape = f'type="mesh" mesh={quoted(self.meshes.setdefault(file, f"mesh{len(self.meshes)}"))}'
+            asset = mesh_name(visual.mesh, self.folder), size
+            shape = f'type="mesh" mesh={quoted(self.meshes.setdefault(asset, f"mesh{len(self.meshes)}"))}'
         else:
             shape = f'type="{visual.shape}" size="{numbers([size[0], 0.5 * size[1]])}"'
         rest = f'rgba="{numbers(visual.rgba)}" contype="0" conaffinity="0" mass="0"'
@@ -251,6 +251,10 @@ def _inertia(inertia: pin.Inertia) -> str:
 
 def _section(tag: str, lines: list[str]) -> list[str]:
     return [f"  <{tag}>", *lines, f"  </{tag}>"] if lines else []
+
+
+def _scale(scale: tuple[float, ...]) -> str:
+    return "" if scale == (1.0, 1.0, 1.0) else f' scale="{numbers(scale)}"'
 
 
 def _pose(M: Array) -> str:

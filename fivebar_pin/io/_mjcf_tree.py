@@ -11,16 +11,18 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
 from fivebar_pin.errors import FiveBarPinError, UnknownNameError
 from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry
-from fivebar_pin.io._mjcf_mass import geom_inertia, geom_shape, stated_inertia
-from fivebar_pin.io._mjcf_reader import MjcfReader
+from fivebar_pin.io._mjcf_assets import Assets
+from fivebar_pin.io._mjcf_mass import geom_inertia, stated_inertia
+from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, turn
+from fivebar_pin.io._mjcf_visuals import geom_visual
 from fivebar_pin.springs import JointSpring
 
 __all__ = ["WORLD", "BodyTree"]
 
 WORLD = "world"
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "SPHERICAL", "free": "floating"}
-_READ = ("body", "freejoint", "geom", "inertial", "joint", "site")
-_IGNORED = ("camera", "light")
+_READ = ("body", "frame", "freejoint", "geom", "inertial", "joint", "site")
+_LEFT_OUT = ("camera", "light")
 
 
 class BodyTree:
@@ -28,15 +30,16 @@ class BodyTree:
 
     Attributes:
         links, joints, order: what a `TreeEntry` needs, and the moving joints in MuJoCo's order.
-        poses: pose of each link in the world when every joint is at zero.
+        refs: coordinate of hinges and slides as the file places them, where that is not zero [rad or m].
+        poses: pose of each link in the world as the file places it.
         sites: link that stands for each named site.
         data: armature and losses per joint.
         springs: on joints, in the order of the joints.
         rests: where the springs of hinges and slides are relaxed, whether there is one or not [rad or m].
     """
 
-    def __init__(self, reader: MjcfReader, meshes: dict[str, str]) -> None:
-        self.reader, self.meshes = reader, meshes
+    def __init__(self, reader: MjcfReader, assets: Assets) -> None:
+        self.reader, self.assets = reader, assets
         self.links: dict[str, LinkEntry] = {WORLD: LinkEntry(WORLD)}
         self.joints: dict[str, JointEntry] = {}
         self.order: list[str] = []
@@ -46,6 +49,7 @@ class BodyTree:
         self.data: dict[str, dict[str, list[float]]] = {}
         self.springs: list[JointSpring] = []
         self.rests: dict[str, float] = {}
+        self.refs: dict[str, float] = {}
 
     def tree(self, name: str) -> TreeEntry:
         """Return the tree that was walked."""
@@ -53,6 +57,7 @@ class BodyTree:
 
     def world(self, worldbody: ElementTree.Element) -> None:
         """Walk <worldbody>; recursion is bounded by the depth that the XML reader admits."""
+        self.reader.without_frames(worldbody)
         if worldbody.attrib.get("name", WORLD) != WORLD:
             raise self.reader.fail("<worldbody>", "is always called world")
         self.contents(worldbody, WORLD, WORLD, worldbody.get("childclass"))
@@ -65,11 +70,14 @@ class BodyTree:
             elif child.tag == "site":
                 self.site(self.reader.with_defaults(child, childclass), link, where)
             elif child.tag == "geom":
-                visuals += self.visual(self.reader.with_defaults(child, childclass), link, where)
+                full = self.reader.with_defaults(child, childclass)
+                visuals += geom_visual(self.reader, self.assets, full, link, f"geom of {where}")
             elif child.tag in ("joint", "freejoint", "inertial") and body.tag == "worldbody":
                 raise self.reader.fail(where, f"<{child.tag}> is not for the world")
-            elif child.tag not in _READ and child.tag not in _IGNORED:
-                problem = str(UnknownNameError("element of a body", child.tag, (*_READ, *_IGNORED)))
+            elif child.tag in _LEFT_OUT:
+                self.reader.left_out.append(child.tag)
+            elif child.tag not in _READ:
+                problem = str(UnknownNameError("element of a body", child.tag, (*_READ, *_LEFT_OUT)))
                 raise self.reader.fail(where, problem + " Elements that generate others must be written out.")
         old = self.links[link]
         self.links[link] = LinkEntry(link, old.inertia, tuple(visuals))
@@ -81,9 +89,10 @@ class BodyTree:
         if name in self.bodies:
             raise reader.fail(where, "is defined twice")
         reader.check_known(body, where)
-        for word in ("mocap", "gravcomp"):
-            if body.get(word, "0").strip() not in ("0", "false", "0.0"):
-                raise reader.fail(where, f"{word} is not supported; remove it")
+        if any(_plain(reader, body, "gravcomp", where)):
+            reader.left_out.append("gravity compensation")
+        if body.get("mocap", "false") == "true":
+            reader.left_out.append(f"mocap of {where}, which stays where it is")
         childclass = body.get("childclass", above)
         pose = reader.pose(body, where)
         joints = [reader.with_defaults(j, childclass) for j in body if j.tag == "joint"]
@@ -113,7 +122,8 @@ class BodyTree:
             if child != link:
                 self.links[child] = LinkEntry(child)
                 self.poses[child] = self.poses[parent] @ M
-            self.joints[name] = JointEntry(name, kind, parent, child, M, axis, self.limits(element, kind, name))
+            limits = self.limits(element, kind, name)
+            self.joints[name] = JointEntry(name, kind, parent, child, self.at_zero(name, kind, M, axis), axis, limits)
             self.order.append(name)
             parent = child
         if not joints or np.any(offset):
@@ -133,15 +143,30 @@ class BodyTree:
             raise reader.fail(where, str(UnknownNameError("joint type", word, _KINDS)))
         if word == "free" and count > 1:
             raise reader.fail(where, "a free joint must be the only one of its body")
-        for attribute in ("ref", "springdamper"):
+        for attribute in ("springdamper", "springyield"):
             if any(_plain(reader, element, attribute, where)):
-                raise reader.fail(where, f"{attribute} is not supported; remove it, and state stiffness and springref")
+                raise reader.fail(where, f"{attribute} is not supported; remove it, and state stiffness and damping")
         self.spring(element, name, word, where)
-        position = np.array(reader.numbers(element, "pos", 3, where, [0.0, 0.0, 0.0]))
         if word == "free":
+            if "true" in (element.get("align"), reader.compiler.get("alignfree")):
+                raise reader.fail(where, "a frame moved to the mass centre is not supported; remove align or alignfree")
             return np.zeros(3), _KINDS[word], np.array([0.0, 0.0, 1.0])
+        if word != "ball":
+            (ref,) = reader.numbers(element, "ref", 1, where, [0.0])
+            self.refs[name] = reader.angle(ref) if word == "hinge" else ref
+        M = reader.frame(element)
+        position = np.array(reader.numbers(element, "pos", 3, where, [0.0, 0.0, 0.0]))
         axis = reader.unit(np.array(reader.numbers(element, "axis", 3, where, [0.0, 0.0, 1.0])), "axis", where)
-        return position, _KINDS[word], axis
+        return M[:3, :3] @ position + M[:3, 3], _KINDS[word], M[:3, :3] @ axis
+
+    def at_zero(self, name: str, kind: str, M: Array, axis: Array) -> Array:
+        """Return the placement at which the coordinate counts from zero, as the file places the joint at `ref`."""
+        ref = self.refs.get(name, 0.0)
+        if not ref:
+            return M
+        if kind == "prismatic":
+            return M @ homogeneous(-ref * axis, np.eye(3))
+        return M @ homogeneous(np.zeros(3), turn(axis, -ref))
 
     def spring(self, element: ElementTree.Element, name: str, word: str, where: str) -> None:
         """Keep the spring of a joint."""
@@ -198,10 +223,15 @@ class BodyTree:
         rule = reader.compiler.get("inertiafromgeom", "auto")
         if stated is not None and rule != "true":
             return stated_inertia(reader, stated, where)
+        compiler = ElementTree.Element("compiler", reader.compiler)
+        low, high = reader.numbers(compiler, "inertiagrouprange", 2, "<compiler>", [0.0, 5.0])
         total: pin.Inertia | None = None
         if rule != "false":
             for geom in body.findall("geom"):
-                part = geom_inertia(reader, reader.with_defaults(geom, childclass), f"geom of {where}")
+                full = reader.with_defaults(geom, childclass)
+                if not low <= reader.numbers(full, "group", 1, where, [0.0])[0] <= high:
+                    continue
+                part = geom_inertia(reader, self.assets, full, f"geom of {where}")
                 total = part if total is None else total if part is None else total + part
         return total
 
@@ -240,24 +270,6 @@ class BodyTree:
         while free in self.joints:
             k, free = k + 1, f"{name}_{k}"
         return free
-
-    def visual(self, geom: ElementTree.Element, link: str, where: str) -> list[Visual]:
-        """Return what is drawn of a geom; planes, height fields and ellipsoids are not."""
-        where = f"geom of {where}"
-        kind, sizes, M = geom_shape(self.reader, geom, where)
-        r, g, b, a = self.reader.numbers(geom, "rgba", 4, where, [0.5, 0.5, 0.5, 1.0])
-        if kind == "mesh":
-            mesh = self.meshes.get(geom.get("mesh", ""))
-            if mesh is None:
-                raise self.reader.fail(where, str(UnknownNameError("mesh", geom.get("mesh"), self.meshes)))
-            return [Visual(link, "mesh", (1.0, 1.0, 1.0), M, (r, g, b, a), mesh)]
-        if kind == "box":
-            sizes = [2.0 * s for s in sizes]
-        elif kind in ("capsule", "cylinder"):
-            sizes = [sizes[0], 2.0 * sizes[1]]
-        elif kind != "sphere":
-            return []
-        return [Visual(link, kind, tuple(sizes), M, (r, g, b, a))]
 
 
 def _plain(reader: MjcfReader, element: ElementTree.Element, attribute: str, where: str) -> list[float]:
