@@ -86,7 +86,7 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     if closed:
         findings += about_roads(apart)
         findings += about_idle(idle)
-        findings += about_mobility(chain, here, generic, redundant)
+        findings += about_mobility(chain, here, generic, redundant, is_tree=not bare.closures)
         findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
         findings += about_singularity(chain, here, generic, actuation, sigma)
         findings += about_parts(chain, here, generic, idle)

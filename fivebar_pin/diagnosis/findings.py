@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.chain.coordinates import q_slice, v_slice
-from fivebar_pin.closures.rest import Still
 from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import Actuation, Finding, RedundantRow
 from fivebar_pin.mechanism.configurations import Configurations
@@ -60,10 +59,15 @@ def about_idle(idle: tuple[Idle, ...]) -> Iterator[Finding]:
 
 
 def about_mobility(
-    chain: ClosedChain, here: Configurations, generic: Configurations, redundant: tuple[RedundantRow, ...]
+    chain: ClosedChain,
+    here: Configurations,
+    generic: Configurations,
+    redundant: tuple[RedundantRow, ...],
+    *,
+    is_tree: bool,
 ) -> Iterator[Finding]:
     """Find what keeps the mechanism from moving, or from moving in one way, and rows that are too many."""
-    if all(isinstance(c, Still) for c in chain.closures):
+    if is_tree:
         yield Finding("note", "there are no closures: this is an open tree")
     if chain.nv == generic.rank:
         yield Finding("error", f"the mechanism cannot move: mobility 0. A closure or its kind is too much. {ROUNDED}")
