@@ -129,7 +129,8 @@ def test_motors_are_the_joints_of_transmissions_and_of_ros2_control(tmp_path: Pa
         '<joint name="b"><state_interface name="position"/></joint></ros2_control>'
     )
     more = MOTOR.replace('name="a"', 'name="e"') + MOTOR.replace('name="a"', 'name="gone"')
-    besides = LINK.format("extra", 0) + mimic + GAZEBO + MOTOR + MOTOR + more + control
+    more += NAMED + MOTOR.replace('name="a"', 'name="p1"')
+    besides = LINK.format("extra", 0) + mimic + MOTOR + MOTOR + more + control
     assert io.load(write(tmp_path, besides)).actuated == ("a", "d")
 
 
