@@ -209,9 +209,8 @@ def stated_inertia(mass: float, com: Array, tensor: Array) -> pin.Inertia | None
 
     Moments without mass are kept as they are: the diagnosis tells that no body has them.
     """
-    if mass == 0.0:
-        return bare_inertia(0.0, np.zeros(3), tensor) if np.abs(tensor).max() > _NO_MOMENT else None
-    return bare_inertia(mass, com, tensor)
+    massless = mass == 0.0 and np.abs(tensor).max() <= _NO_MOMENT
+    return None if massless else bare_inertia(mass, com, tensor)
 
 
 def joint_model(kind: str, axis: Array) -> object:

@@ -83,15 +83,15 @@ def close(reader: Reader, tree: TreeEntry, loops: list[Loop]) -> tuple[TreeEntry
 
 
 def world_poses(tree: TreeEntry) -> dict[str, Array]:
-    """Return the pose of every link with all joints at zero, homogeneous (4, 4)."""
+    """Return the pose of every link of a URDF in its root, all joints at zero, homogeneous (4, 4)."""
     children: dict[str, list[JointEntry]] = {}
     for joint in tree.joints.values():
         children.setdefault(joint.parent, []).append(joint)
-    poses, front = {tree.root: tree.placement}, [tree.root]
+    poses, front = {tree.root: np.eye(4)}, [tree.root]
     while front:
         link = front.pop()
         for joint in children.get(link, []):
-            poses[joint.child] = poses[link] @ joint.placement @ joint.offset
+            poses[joint.child] = poses[link] @ joint.placement
             front.append(joint.child)
     return poses
 

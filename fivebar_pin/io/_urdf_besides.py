@@ -54,11 +54,11 @@ def read_loops(reader: Reader, robot: ElementTree.Element, tree: TreeEntry) -> l
         elif element.tag == _BALL:
             loops.append(_ball(reader, element, len(loops)))
     poses = world_poses(tree)
-    loops += [_gazebo_loop(reader, element, poses, tree.root) for element in robot.findall("gazebo/joint")]
+    loops += [_gazebo_loop(reader, element, poses) for element in robot.findall("gazebo/joint")]
     return loops + detachable(reader, robot.findall("gazebo/plugin"), poses)
 
 
-def _gazebo_loop(reader: Reader, element: ElementTree.Element, poses: dict[str, Array], root: str) -> Loop:
+def _gazebo_loop(reader: Reader, element: ElementTree.Element, poses: dict[str, Array]) -> Loop:
     """Return a joint of SDF between two links, which sits where it is in the child with all joints at zero."""
     name = reader.text(element, "name", "a <joint> in <gazebo>")
     where = f"joint {name!r} in <gazebo>"
@@ -72,7 +72,7 @@ def _gazebo_loop(reader: Reader, element: ElementTree.Element, poses: dict[str, 
     in_parent = relative(poses[parent], joint)
     axis = np.array(text_numbers(reader, element, "axis/xyz", 3, where, _X))
     if element.findtext("axis/use_parent_model_frame", "0").strip() in ("1", "true"):
-        axis = joint[:3, :3].T @ poses[root][:3, :3] @ axis
+        axis = joint[:3, :3].T @ axis
     kind = reader.text(element, "type", where)
     return Loop(name, kind, (parent, child), (in_parent, in_child), _unit(reader, axis, where))
 

@@ -203,6 +203,16 @@ def test_a_nested_model_is_part_of_the_tree(tmp_path: Path) -> None:
     np.testing.assert_allclose(placed(load(tmp_path, named), q)["low::lower"], turned(ARM, q)["lower"], atol=1e-14)
 
 
+def test_a_frame_on_a_world_that_nothing_hangs_on_is_passed_over(tmp_path: Path) -> None:
+    """The root of a free model has no place in the world that lasts."""
+    start, end = ARM.index('<joint name="foot"'), ARM.index('<joint name="shoulder"')
+    text = ARM.replace(ARM[start:end], '<frame name="far" attached_to="world"/>')
+    assert "far" not in placed(load(tmp_path, text), {})
+    assert "far" in placed(
+        load(tmp_path, ARM.replace("</model>", '<frame name="far" attached_to="world"/></model>')), {}
+    )
+
+
 def test_a_link_without_joints_is_no_root(tmp_path: Path) -> None:
     """It is refused for itself, not the rest because of it."""
     start, end = ARM.index('<joint name="foot"'), ARM.index('<joint name="shoulder"')
@@ -271,6 +281,19 @@ def test_a_joint_turned_round_keeps_its_coordinate(tmp_path: Path, kind: str) ->
     np.testing.assert_allclose(np.linalg.inv(ours["lower"]) @ ours["upper"], expected, atol=1e-14)
 
 
+def test_a_fixed_joint_and_one_of_the_sidecar_leave_links_where_they_are(tmp_path: Path) -> None:
+    """The joint is away from its child's origin."""
+    fixed = load(tmp_path, ARM.replace('"elbow" type="revolute"', '"elbow" type="fixed"'))
+    (tmp_path / "arm.yaml").write_text(
+        "closed_loop: []\ntype: []\nname_mot: [shoulder]\njoint_name: [elbow]\njoint_type: [CARDAN]\n"
+    )
+    cardan = io.load(write(tmp_path, ARM))
+    assert (fixed.joints, cardan.joints) == (("shoulder",), ("shoulder", "elbow_X", "elbow_Y"))
+    for chain in (fixed, cardan):
+        theirs = turned(ARM, {"shoulder": 0.7})["lower"]
+        np.testing.assert_allclose(placed(chain, {"shoulder": 0.7})["lower"], theirs, atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("stated", "advance"),
     [
@@ -319,7 +342,7 @@ def test_shapes_are_drawn_where_the_file_says(tmp_path: Path) -> None:
         + visual(
             "",
             "<mesh><uri>model://a/b.stl</uri><scale>1 1 -1</scale></mesh>",
-            "<material><diffuse>1 0 0</diffuse></material>",
+            "<material><ambient>0 0 1 1</ambient><diffuse>1 0 0</diffuse></material>",
         )
         + visual(
             '<pose relative_to="base"/>',
@@ -374,8 +397,9 @@ def test_an_empty_element_says_nothing(tmp_path: Path) -> None:
 
 def test_a_link_without_inertial_has_the_mass_that_sdf_says(tmp_path: Path) -> None:
     """One kilogram and one kg m2; with a mass of zero and no moments none."""
-    plain = load(tmp_path, ARM.replace(MASS.format(0.5), ""))
-    np.testing.assert_allclose(plain.model.inertias[2].toDynamicParameters()[0], 1.0)
+    plain = load(tmp_path, ARM.replace(MASS.format(0.5), "").replace("<pose>0.05 0 0 0 0.3 0</pose>", ""))
+    stated = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0]
+    np.testing.assert_array_equal(plain.model.inertias[2].toDynamicParameters(), stated)
     none = "<inertial><mass>0</mass><inertia><ixx>0</ixx><iyy>0</iyy><izz>0</izz></inertia></inertial>"
     assert load(tmp_path, ARM.replace(MASS.format(0.5), none)).model.inertias[2].mass == 0.0
 
@@ -527,7 +551,7 @@ def test_plugins_state_welds_and_motors(tmp_path: Path) -> None:
     start, end = FOUR_BAR.index(LAST), FOUR_BAR.index("</model>")
     names = "<joint_name>a</joint_name><joint_name>gone</joint_name>"
     plugins = (
-        PLUGIN.format("gz::sim::systems::DetachableJoint", WELDED)
+        PLUGIN.format("gz-sim-detachable-joint-system", WELDED)
         + PLUGIN.format("gz-sim-joint-position-controller-system", names)
         + PLUGIN.format("gz-sim-joint-state-publisher-system", "<joint_name>b</joint_name>")
     )

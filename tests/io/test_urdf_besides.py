@@ -100,6 +100,12 @@ def test_a_gazebo_joint_keeps_its_axis_whichever_frame_states_it(tmp_path: Path)
     np.testing.assert_allclose(io.load(write(tmp_path, text)).closures[0].axis, [1.0, 0.0, 0.0], atol=1e-15)
 
 
+def test_a_closure_at_the_origin_of_a_link_is_at_the_link(tmp_path: Path) -> None:
+    """No frame is made that is there already."""
+    text = CONSTRAINT.replace('<child link="rocker"/><child_origin xyz="1 0 0"/>', '<child link="rocker"/>')
+    assert io.load(write(tmp_path, text)).closures[0].frames == ("c_1", "rocker")
+
+
 def test_a_file_that_closes_its_loops_and_names_no_motor_loads_undriven(tmp_path: Path) -> None:
     chain = io.load(write(tmp_path, GAZEBO))
     assert chain.actuated == ()
@@ -123,7 +129,8 @@ def test_motors_are_the_joints_of_transmissions_and_of_ros2_control(tmp_path: Pa
         '<joint name="b"><state_interface name="position"/></joint></ros2_control>'
     )
     more = MOTOR.replace('name="a"', 'name="e"') + MOTOR.replace('name="a"', 'name="gone"')
-    besides = LINK.format("extra", 0) + mimic + GAZEBO + MOTOR + MOTOR + more + control
+    more += NAMED + MOTOR.replace('name="a"', 'name="p1"')
+    besides = LINK.format("extra", 0) + mimic + MOTOR + MOTOR + more + control
     assert io.load(write(tmp_path, besides)).actuated == ("a", "d")
 
 
