@@ -22,7 +22,7 @@ from fivebar_pin.io._mjcf_equality import FACTOR, HINGE, Equality
 from fivebar_pin.io._mjcf_include import including
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
 from fivebar_pin.io._mjcf_sections import check_disabled, check_sections, gravity
-from fivebar_pin.io._mjcf_springs import tendon_springs
+from fivebar_pin.io._mjcf_springs import tendon_springs, timed_springs
 from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._sidecar import Sidecar
 from fivebar_pin.springs import JointSpring, Spring
@@ -77,9 +77,13 @@ def read_mjcf(
     tree = bodies.tree(root.get("model") or path.stem)
     sidecar = Sidecar(gravity=gravity(reader, root), joint_order=_order(reader, root, bodies), joint_data=bodies.data)
     model = build_model(tree, sidecar, free_flyer=False, urdf=path, beside=path)
-    _stated_pose(model, bodies)
+    stated = _stated_pose(model, bodies)
     _keyframes(reader, root, model, bodies.order)
-    springs: tuple[Spring | JointSpring, ...] = (*tendon_springs(reader, root, bodies, model), *bodies.springs)
+    springs: tuple[Spring | JointSpring, ...] = (
+        *tendon_springs(reader, root, bodies, model),
+        *bodies.springs,
+        *timed_springs(reader, bodies, model, stated),
+    )
     acting = {
         "damper": bool(np.any(model.damping)) or any(spring.damping for spring in springs),
         "frictionloss": bool(np.any(model.upperDryFrictionLimit)),
@@ -100,13 +104,15 @@ def read_mjcf(
     return chain
 
 
-def _stated_pose(model: pin.Model, bodies: BodyTree) -> None:
-    """Keep where the file places its joints as a reference configuration, where it is not the neutral one."""
-    if any(bodies.refs.values()):
-        q = pin.neutral(model)
-        for joint, ref in bodies.refs.items():
-            q[model.idx_qs[model.getJointId(joint)]] = ref
+def _stated_pose(model: pin.Model, bodies: BodyTree) -> Array:
+    """Return where the file places its joints, and keep it as a reference where it is not the neutral configuration."""
+    q: Array = pin.neutral(model)
+    moved = {joint: ref for joint, ref in bodies.refs.items() if ref}
+    for joint, ref in moved.items():
+        q[model.idx_qs[model.getJointId(joint)]] = ref
+    if moved:
         model.referenceConfigurations[STATED] = q
+    return q
 
 
 def _order(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> tuple[str, ...]:

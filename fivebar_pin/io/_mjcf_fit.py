@@ -26,7 +26,7 @@ def fitted(mesh: Mesh, kind: str, scale: float, *, around: bool) -> tuple[list[f
         around: fit the box around the points, not the box of equal inertia.
 
     Raises:
-        ValueError: the mesh cannot be read, or has no volume; says why.
+        ValueError: the mesh cannot be read, has no volume, or is too wide for a capsule; says why.
     """
     inertia = mesh_inertia(mesh)
     moments, axes = np.linalg.eigh(np.array(inertia.inertia))
@@ -50,4 +50,7 @@ def _sizes(kind: str, half: Array, *, around: bool) -> list[float]:
     radius = max(a, b) if around else 0.5 * (a + b)
     if kind == "cylinder":
         return [radius, c]
-    return [radius, max(0.0, c - radius if around else c - 0.5 * radius)]
+    length = c - radius if around else c - 0.5 * radius
+    if length <= 0.0:
+        raise ValueError("is wider than long, so that no capsule fits")
+    return [radius, length]

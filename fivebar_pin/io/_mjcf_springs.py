@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain, frames_by_name
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._mjcf_equality import fixed_ratios
@@ -22,7 +23,7 @@ from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._urdf_text import numbers, quoted
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["joint_springs_to_write", "tendon_lines", "tendon_springs"]
+__all__ = ["joint_springs_to_write", "tendon_lines", "tendon_springs", "timed_springs"]
 
 _AUTOMATIC = -1.0
 """MuJoCo's springlength for the length where the springs of all joints are relaxed."""
@@ -62,6 +63,27 @@ def tendon_springs(
             raise
         except FiveBarPinError as error:
             raise reader.fail(where, str(error)) from error
+    return tuple(springs)
+
+
+def timed_springs(reader: MjcfReader, bodies: BodyTree, model: pin.Model, q: Array) -> tuple[JointSpring, ...]:
+    """Return the springs that are stated by time constant T and damping ratio z, and give their joints the damping.
+
+    k = I / (T z)^2 and b = 2 I / T with I = 1 / (M^-1)_jj where the file places the joints, at q.
+    """
+    if not bodies.timed:
+        return ()
+    M = pin.crba(model, model.createData(), q)
+    M = np.triu(M) + np.triu(M, 1).T
+    springs = []
+    for joint, (T, z) in bodies.timed.items():
+        v = model.idx_vs[model.getJointId(joint)]
+        try:
+            inertia = 1.0 / float(np.linalg.solve(M, np.eye(model.nv)[v])[v])
+        except np.linalg.LinAlgError as error:
+            raise reader.fail(f"joint {joint!r}", "springdamper needs bodies of mass; state stiffness") from error
+        model.damping[v] = 2.0 * inertia / T
+        springs.append(JointSpring(joint, inertia / (T * z) ** 2, bodies.rests[joint]))
     return tuple(springs)
 
 

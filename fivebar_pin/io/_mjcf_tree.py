@@ -30,6 +30,7 @@ class BodyTree:
 
     Attributes:
         links, joints, order: what a `TreeEntry` needs, and the moving joints in MuJoCo's order.
+        timed: time constant [s] and damping ratio [-] of joints whose springs are stated so.
         refs: coordinate of hinges and slides as the file places them, where that is not zero [rad or m].
         poses: pose of each link in the world as the file places it.
         bodies: link of each body.
@@ -55,6 +56,7 @@ class BodyTree:
         self.springs: list[JointSpring] = []
         self.rests: dict[str, float] = {}
         self.refs: dict[str, float] = {}
+        self.timed: dict[str, tuple[float, float]] = {}
 
     def tree(self, name: str) -> TreeEntry:
         """Return the tree that was walked."""
@@ -149,9 +151,8 @@ class BodyTree:
             raise reader.fail(where, str(UnknownNameError("joint type", word, _KINDS)))
         if word == "free" and count > 1:
             raise reader.fail(where, "a free joint must be the only one of its body")
-        for attribute in ("springdamper", "springyield"):
-            if any(_plain(reader, element, attribute, where)):
-                raise reader.fail(where, f"{attribute} is not supported; remove it, and state stiffness and damping")
+        if any(_plain(reader, element, "springyield", where)):
+            raise reader.fail(where, "springyield is not supported; remove it")
         self.spring(element, name, word, where)
         if word == "free":
             if "true" in (element.get("align"), reader.compiler.get("alignfree")):
@@ -177,10 +178,15 @@ class BodyTree:
     def spring(self, element: ElementTree.Element, name: str, word: str, where: str) -> None:
         """Keep the spring of a joint."""
         (stiffness,) = self.reader.numbers(element, "stiffness", 1, where, [0.0])
+        timed = self.reader.numbers(element, "springdamper", 2, where, [0.0, 0.0])
         if word not in ("hinge", "slide"):
-            if stiffness:
+            if stiffness or any(timed):
                 raise self.reader.fail(where, f"stiffness of a {word} joint is not supported; remove it")
             return
+        if any(timed):
+            if min(timed) <= 0.0:
+                raise self.reader.fail(where, f"springdamper = {timed} must be positive [s, -]")
+            self.timed[name], stiffness = (timed[0], timed[1]), 0.0
         (rest,) = self.reader.numbers(element, "springref", 1, where, [0.0])
         self.rests[name] = self.reader.angle(rest) if word == "hinge" else rest
         try:

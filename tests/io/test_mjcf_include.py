@@ -138,6 +138,7 @@ OF_PARTS = '<mujoco><include file="m.xml"/><worldbody/><equality/></mujoco>'
         ({"arm": ROBOT, "motors": '<mujoco><include file="arm.xml"/><actuator/></mujoco>'}, "motors.xml"),
         ({"arm": ROBOT, "keys": "<mujoco><keyframe/></mujoco>"}, "arm.xml"),
         ({"arm": ROBOT, "robot": ROBOT}, "robot.xml"),
+        ({"scene": SCENE, "package": "<package/>"}, "scene.xml"),
     ],
 )
 def test_of_a_folder_the_mechanism_is_taken_not_its_scene_or_its_parts(

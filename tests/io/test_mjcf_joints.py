@@ -96,10 +96,11 @@ def gap(twin: Twin, q: np.ndarray) -> float:
     return float(np.linalg.norm(two - one))
 
 
-FRAMES = """<mujoco><default><default class="x"><geom size="0.2"/><joint armature="0.3"/></default></default><worldbody>
+FRAMES = """<mujoco><default><default class="x"><geom size="0.2"/>
+<joint armature="0.3"/></default><default class="y"><geom size="0.4"/></default></default><worldbody>
 <frame pos="0.1 0.2 0.3" euler="10 20 30" childclass="x"><frame euler="0 0 40">
 <body name="a" pos="1 0 0" euler="5 0 0"><frame pos="0.1 0 0.2" euler="0 60 0">
-<joint name="ja" axis="1 2 3" pos="0 0.1 0"/><geom/><site name="tip" pos="0.3 0 0"/></frame>
+<joint name="ja" axis="1 2 3" pos="0 0.1 0"/><geom/><site name="tip" pos="0.3 0 0"/><geom class="y"/></frame>
 <geom type="capsule" size="0.1" fromto="0 0 0 1 1 1"/>
 <frame pos="0 0 0.1" euler="0 0 20"><inertial mass="2" pos="0.1 0 0" diaginertia="0.1 0.2 0.25"/></frame>
 <frame zaxis="1 1 0"><body name="b"><joint name="jb" axis="0 1 0"/>
@@ -141,6 +142,18 @@ def test_fixed_tendons_of_one_joint_are_its_springs_and_their_motors_its_own(tmp
     np.testing.assert_array_equal(chain.model.upperEffortLimit, [3.5, 4.0])
 
 
+TIMED = """<mujoco><worldbody><body name="a"><joint name="ja" axis="0 1 0" springdamper="0.2 0.7" armature="0.1"
+ref="20" damping="3"/>{}<body name="b" pos="0.5 0 0"><joint name="jb" axis="0 1 0" springdamper="0.5 1.7" stiffness="9"
+springref="5"/><geom size="0.1" pos="0 0.1 0.3"/></body></body></worldbody></mujoco>"""
+
+
+def test_springs_stated_by_their_time_are_those_of_mujoco(tmp_path: Path) -> None:
+    Twin(write(tmp_path, TIMED.format('<geom size="0.1" pos="0.3 0 0"/>'))).assert_same()
+    bare = TIMED.format("").replace('<geom size="0.1" pos="0 0.1 0.3"/>', "")
+    with pytest.raises(FileFormatError, match="joint 'ja': springdamper needs bodies of mass; state stiffness"):
+        fb.load(write(tmp_path, bare))
+
+
 SPLIT = """<mujoco><worldbody><body name="a"><joint name="ja"/><geom size="0.1"/></body>
 <body name="b"><joint name="jb"/><geom size="0.1"/></body><body name="c"><joint name="jc"/><geom size="0.1"/></body>
 <body name="d"><joint name="jd" type="ball"/><geom size="0.1"/></body><site name="s"/></worldbody>
@@ -177,13 +190,13 @@ def test_equalities_that_a_flag_takes_away_are_off(tmp_path: Path, flag: str) ->
 
 
 def test_a_wide_range_of_a_fixed_tendon_is_a_bound_and_is_told(tmp_path: Path) -> None:
-    """The crank's limits let it go 13.96 rad."""
-    tied = '<tendon><fixed name="far" range="-0.7 {}"><joint joint="crank" coef="1"/></fixed>'
-    path = write(tmp_path, LINKAGE.replace("<tendon>", tied.format(0.7), 1))
+    """The crank's limits let it go 13.96 rad, and the tendon twice as far."""
+    tied = '<tendon><fixed name="far" range="-1.4 {}"><joint joint="crank" coef="-2"/></fixed>'
+    path = write(tmp_path, LINKAGE.replace("<tendon>", tied.format(1.4), 1))
     with pytest.warns(LeftOutWarning, match="mechanism: range of fixed 'far'$"):
         fb.load(path)
     with pytest.raises(FileFormatError, match="fixed 'far': range: limits that tie bodies"):
-        fb.load(write(tmp_path, LINKAGE.replace("<tendon>", tied.format(0.69), 1)))
+        fb.load(write(tmp_path, LINKAGE.replace("<tendon>", tied.format(1.39), 1)))
 
 
 def test_a_keyframe_without_an_orientation_has_the_neutral_one(tmp_path: Path) -> None:

@@ -95,6 +95,30 @@ def test_a_shape_fitted_to_a_mesh_is_that_of_mujoco(tmp_path: Path, kind: str, a
         sizes = np.array(drawn.size) * {"box": [0.5] * 3, "sphere": [1.0]}.get(kind, [1.0, 0.5])
         np.testing.assert_allclose(sizes, m.geom_size[0, : len(sizes)], rtol=1e-9)
         np.testing.assert_allclose(drawn.placement[:3, 3], m.geom_pos[0], rtol=1e-9)
+        assert np.linalg.det(drawn.placement[:3, :3]) == pytest.approx(1.0)
+
+
+# a post along z and a needle across it, longer than the post
+POST = np.array(
+    [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-2, 2)] + [[8, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1]]
+)
+SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+TRIANGLES = [t for a, b, c, d in SIDES for t in ((a, b, c), (a, c, d))] + [
+    (8, 10, 11),
+    (9, 11, 10),
+    (8, 11, 9),
+    (8, 9, 10),
+]
+
+
+def test_no_capsule_fits_a_mesh_that_is_wider_than_long(tmp_path: Path) -> None:
+    points = " ".join(str(x) for x in (POST / 32.0).ravel())
+    mesh = f'vertex="{points}" face="{" ".join(str(x) for t in TRIANGLES for x in t)}" inertia="exact"'
+    path = model(tmp_path, mesh, 'type="capsule" mesh="m"', '<compiler fitaabb="true"/>')
+    with pytest.raises(ValueError, match="must be positive"):
+        mujoco.MjModel.from_xml_path(str(path))
+    with pytest.raises(FileFormatError, match="mesh 'm', which is wider than long, so that no capsule fits; state"):
+        fb.load(path)
 
 
 @pytest.mark.parametrize(
