@@ -40,10 +40,10 @@ def load(
     """Load a closed chain.
 
     Args:
-        path: a folder with one URDF (and its sidecar) or one file of another format; a .urdf, .sdf, .world or .xacro
-            file whose sidecar lies beside it under the same name (.yaml or .yml), or as the folder's only sidecar; an
-            MJCF .xml file; or the name of a mechanism that ships (`shipped`), where no file or folder is called so.
-            A file that closes its loops itself needs no sidecar.
+        path: a folder with one URDF (and its sidecar) or one file of another format, MJCF scenes that include it left
+            aside; a .urdf, .sdf, .world or .xacro file whose sidecar lies beside it under the same name (.yaml or
+            .yml), or as the folder's only sidecar; an MJCF .xml file; or the name of a mechanism that ships
+            (`shipped`), where no file or folder is called so. A file that closes its loops itself needs no sidecar.
         free_flyer: put the root of a URDF or SDF on a free-flying base.
         closures: use these instead of the file's closures, among them the couplings that <mimic> states in a URDF;
             with `actuated`, no sidecar is needed.
@@ -52,7 +52,7 @@ def load(
         max_bytes: size above which a file is not read.
 
     Returns:
-        The chain; meshes are named in its visuals but not read.
+        The chain; meshes are named in its visuals, and read where an MJCF file takes a mass from them.
 
     Warns:
         LeftOutWarning: what a file states and the mechanism goes without, in one line.

@@ -18,10 +18,10 @@ from fivebar_pin.io._left_out import left_out
 from fivebar_pin.io._mjcf_actuators import driven_joints
 from fivebar_pin.io._mjcf_adjust import adjust_masses
 from fivebar_pin.io._mjcf_assets import Assets
-from fivebar_pin.io._mjcf_equality import Equality
+from fivebar_pin.io._mjcf_equality import FACTOR, HINGE, Equality
 from fivebar_pin.io._mjcf_include import including
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
-from fivebar_pin.io._mjcf_sections import check_sections, gravity
+from fivebar_pin.io._mjcf_sections import check_disabled, check_sections, gravity
 from fivebar_pin.io._mjcf_springs import tendon_springs
 from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._sidecar import Sidecar
@@ -38,6 +38,7 @@ another; a body whose mass of one `GRAIN` stands for none.
 GRAIN = 1e-14
 """Mass and moments of inertia that a moving body without any is written with: ten times MuJoCo's least [kg, kg m2]."""
 
+_OURS = (FACTOR, HINGE, MASSLESS, ORDER, UNBOUNDED)
 STATED = "qpos0"
 """MuJoCo's name for the configuration in which the file places the bodies."""
 _WIDTHS = {"JointModelSpherical": 4, "JointModelFreeFlyer": 7}
@@ -52,10 +53,13 @@ def read_mjcf(
 ) -> ClosedChain:
     """Return the chain that an MJCF file describes; see `fivebar_pin.io.load`.
 
-    Coordinates are in MuJoCo's order. Read: bodies, hinge / slide / ball / free joints with their limits and losses,
-    inertias stated or from solid geoms, default classes, keyframes, the equalities connect, weld, joint and tendon,
-    springs of joints, and spatial tendons between two sites as springs. Contacts, cameras, lights and sensors are not
-    part of a mechanism and are passed over. Whatever else acts on it is refused by name.
+    Coordinates are MuJoCo's, in its order: a joint is at `ref` where the file places it, and that configuration is the
+    reference "qpos0" where it is not zero. Read: included files, frames, bodies, hinge / slide / ball / free joints
+    with their limits and losses, inertias stated or from geoms, meshes too, default classes, keyframes, the equalities
+    connect, weld, joint and tendon, springs of joints, tendons of one joint and between two sites, and the joints that
+    actuators drive. What does not move a mechanism (contacts, cameras, lights, sensors, textures, a fluid), what only
+    stands for a controller (gravcomp, actuators without a joint) and what cannot be drawn is told in one
+    `LeftOutWarning`. Whatever else acts on it is refused by name.
     """
     root, sources = including(path, max_bytes=max_bytes)
     reader = MjcfReader(path, root, sources)
@@ -76,6 +80,12 @@ def read_mjcf(
     _stated_pose(model, bodies)
     _keyframes(reader, root, model, bodies.order)
     springs: tuple[Spring | JointSpring, ...] = (*tendon_springs(reader, root, bodies, model), *bodies.springs)
+    acting = {
+        "damper": bool(np.any(model.damping)) or any(spring.damping for spring in springs),
+        "frictionloss": bool(np.any(model.upperDryFrictionLimit)),
+        "spring": any(spring.stiffness for spring in springs),
+    }
+    check_disabled(reader, root, acting)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     try:
         chain = ClosedChain(model, found, driven, name=tree.name, visuals=visuals, springs=springs)
@@ -83,7 +93,10 @@ def read_mjcf(
         if closures is not None or actuated is not None:
             raise
         raise FileFormatError(path, str(error)) from error
-    left_out(path, reader.left_out)
+    if bodies.compensated:
+        reader.left_out.append(f"gravcomp of {bodies.compensated} bodies, which are of full weight here")
+    custom = [e.get("name", "") for e in root.findall("custom/*")]
+    left_out(path, [*reader.left_out, *("custom value" for name in custom if not name.startswith(_OURS))])
     return chain
 
 
@@ -119,6 +132,8 @@ def _unbounded(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) 
                 raise reader.fail(f"custom {name!r}", "names no hinge of this file")
             if any(spring.joint == joint.name for spring in bodies.springs):
                 raise reader.fail(f"joint {joint.name!r}", "stiffness of a hinge that does not count its turns")
+            if bodies.refs.get(joint.name):
+                raise reader.fail(f"joint {joint.name!r}", "ref of a hinge that does not count its turns")
             data = {word: joint.data[word] for word in ("effort", "velocity")}
             bodies.joints[joint.name] = replace(joint, kind="continuous", data=data)
 

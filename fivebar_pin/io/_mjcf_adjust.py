@@ -31,7 +31,7 @@ def adjust_masses(reader: MjcfReader, bodies: BodyTree) -> None:
     links = [link for link in bodies.bodies.values() if link != WORLD]
     if least or moment or balance:
         for link in links:
-            inertia = bodies.links[link].inertia or pin.Inertia.Zero()
+            inertia = bodies.links[link].inertia or bare_inertia(0.0, bodies.places[link][:3, 3], np.zeros((3, 3)))
             bodies.links[link] = replace(bodies.links[link], inertia=_bounded(inertia, least, moment, balance))
     if total > 0.0:
         inertias = {link: bodies.links[link].inertia or pin.Inertia.Zero() for link in links}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -46,6 +47,8 @@ class Mesh:
         """Why nothing can be read or drawn, "" where it can."""
         if self.file is None:
             return "" if self.vertices is not None else "has no file and no points"
+        if not os.path.isfile(self.file):
+            return "cannot be read (there is no such file)"
         try:
             with open(self.file, "rb") as stream:
                 start = stream.read(len(_POINTER))
@@ -88,7 +91,7 @@ class Assets:
         if points.size % 3 or corners.size % 3:
             raise reader.fail(where, "vertex and face must hold three numbers for each point and triangle")
         if np.any(corners < 0) or np.any(corners >= points.size // 3) or np.any(corners % 1.0):
-            raise reader.fail(where, f"face names points outside 0 to {points.size // 3 - 1}")
+            raise reader.fail(where, f"face must name points by whole numbers from 0 to {points.size // 3 - 1}")
         return Mesh(
             self.file(element, where),
             np.array(reader.numbers(element, "scale", 3, where, [1.0, 1.0, 1.0])),
@@ -109,7 +112,7 @@ class Assets:
         compiler = self.reader.compiler
         file = self.reader.path.parent / compiler.get("meshdir", compiler.get("assetdir", "")) / name
         beside = self.reader.sources.get(where, self.reader.path).parent / name
-        return beside if not file.exists() and beside.exists() else file
+        return beside if not os.path.isfile(file) and os.path.isfile(beside) else file
 
     def find(self, geom: ElementTree.Element, where: str) -> Mesh:
         """Return the mesh that a geom names."""

@@ -21,6 +21,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.closures import Closure, Coupling, Distance, Point, Revolute, Weld
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, UnknownNameError
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, quaternion_matrix
+from fivebar_pin.io._mjcf_sections import disabled
 from fivebar_pin.io._mjcf_tree import WORLD, BodyTree
 
 __all__ = ["FACTOR", "HINGE", "Equality", "fixed_ratios"]
@@ -37,6 +38,7 @@ class Equality:
 
     def __init__(self, reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> None:
         self.reader, self.bodies = reader, bodies
+        self.off = "equality" in disabled(reader, root)
         self.elements = root.findall("equality/*")
         self.tendons = {x.get("name", ""): x for x in root.findall("tendon/*")}
         self.hinges = self.marked(root, HINGE, 3)
@@ -66,7 +68,7 @@ class Equality:
             if element.tag not in kinds:
                 raise self.reader.fail(where, str(UnknownNameError("equality", element.tag, kinds)) + " Remove it.")
             full = self.reader.with_defaults(_apart(element), None)
-            if self.reader.flag(full, "active", where, "true") != "true":
+            if self.off or self.reader.flag(full, "active", where, "true") != "true":
                 self.reader.left_out.append(f"{where}, which is not active")
                 continue
             if name.endswith(" axis") and name[: -len(" axis")] in self.hinges:

@@ -1,11 +1,13 @@
 """One MJCF tree out of a file and those that it includes.
 
 MuJoCo puts the children of an included file's root, whatever that is called, where <include> stands; a name is looked
-up in the folder of the first file, then in that of the including one; and no file may come twice.
+up in the folder of the first file, then in that of the including one; and no file may come twice. An attribute
+without a value is none.
 """
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -80,6 +82,8 @@ class _Merging:
                 children += self.included(child, chain, depth)
                 continue
             self.expand(child, chain, depth + 1)
+            for attribute in [word for word, text in child.attrib.items() if not text.strip()]:
+                del child.attrib[attribute]
             if len(chain) > 1:
                 self.sources.setdefault(element_key(child), chain[-1])
             children.append(child)
@@ -90,9 +94,9 @@ class _Merging:
         if not name.strip() or len(include):
             raise FileFormatError(where, "<include> needs the attribute 'file' and has no content")
         file = self.path.parent / name
-        if not file.exists():
+        if not os.path.isfile(file):
             file = where.parent / name
-        if not file.exists():
+        if not os.path.isfile(file):
             raise FileFormatError(where, f"<include>: there is no file {name!r} in {self.path.parent} or beside it")
         if file.resolve() in {each.resolve() for each in chain}:
             way = " -> ".join(each.name for each in (*chain, file))

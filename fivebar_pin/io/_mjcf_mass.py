@@ -8,9 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin.errors import UnknownNameError
+from fivebar_pin.errors import FiveBarPinError, UnknownNameError
 from fivebar_pin.io._build import bare_inertia
 from fivebar_pin.io._mjcf_assets import Assets
+from fivebar_pin.io._mjcf_fit import fitted
 from fivebar_pin.io._mjcf_meshes import mesh_inertia
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous, shortest_turn
 
@@ -46,13 +47,24 @@ def stated_inertia(reader: MjcfReader, inertial: ElementTree.Element, where: str
     return bare_inertia(mass, M[:3, 3], tensor)
 
 
-def geom_shape(reader: MjcfReader, geom: ElementTree.Element, where: str) -> tuple[str, list[float], Array]:
-    """Return a geom's kind, its sizes (half lengths, as MJCF has them) and its pose in the body."""
+def geom_shape(
+    reader: MjcfReader, assets: Assets, geom: ElementTree.Element, where: str
+) -> tuple[str, list[float], Array]:
+    """Return a geom's kind, its sizes (half lengths, as MJCF has them) and its pose in the body.
+
+    Raises:
+        ValueError: it is fitted to a mesh that cannot be read; says why.
+    """
     kind = geom.get("type", "mesh" if "mesh" in geom.attrib else "sphere")
     if kind not in _KINDS:
         raise reader.fail(where, str(UnknownNameError("geom type", kind, _KINDS)))
-    if kind not in SOLIDS or "mesh" in geom.attrib:
+    if kind not in SOLIDS:
         return kind, [], reader.pose(geom, where)
+    if "mesh" in geom.attrib:
+        (scale,) = reader.numbers(geom, "fitscale", 1, where, [1.0])
+        around = reader.compiler.get("fitaabb") == "true"
+        sizes, M = fitted(assets.find(geom, where), kind, scale, around=around)
+        return kind, sizes, reader.pose(geom, where) @ M
     count = _SIZES[kind]
     if "fromto" in geom.attrib:
         if count == 1:
@@ -79,18 +91,20 @@ def _sizes(reader: MjcfReader, geom: ElementTree.Element, count: int, where: str
 
 def geom_inertia(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, where: str) -> pin.Inertia | None:
     """Return the inertia of a solid geom or a mesh in body axes, None for one without mass."""
-    kind, sizes, M = geom_shape(reader, geom, where)
     (density,) = reader.numbers(geom, "density", 1, where, [1000.0])
     stated = reader.numbers(geom, "mass", 1, where, [-1.0])[0] if "mass" in geom.attrib else None
-    if kind in WITHOUT_MASS or stated == 0.0 or (stated is None and density == 0.0):
+    if geom.get("type") in WITHOUT_MASS or stated == 0.0 or (stated is None and density == 0.0):
         return None
     if reader.flag(geom, "shellinertia", where, "false") != "false":
         raise reader.fail(where, "shellinertia is not supported; state <inertial> in the body")
-    if "mesh" in geom.attrib:
-        inertia = _of_mesh(reader, assets, geom, kind, where)
-    else:
-        volume, unit = _solid(kind, sizes)
-        inertia = bare_inertia(volume, np.zeros(3), np.diag(volume * unit))
+    try:
+        kind, sizes, M = geom_shape(reader, assets, geom, where)
+        inertia = mesh_inertia(assets.find(geom, where)) if kind in ("mesh", "sdf") else _dense(kind, sizes)
+    except ValueError as error:
+        if isinstance(error, FiveBarPinError):
+            raise
+        rule = f'has its mass from mesh {geom.get("mesh")!r}, which {error}; state <inertial> in the body, or mass="0"'
+        raise reader.fail(where, rule) from error
     factor = density if stated is None else stated / inertia.mass
     if factor < 0.0:
         raise reader.fail(where, f"mass = {factor * inertia.mass!r} must not be negative [kg]")
@@ -98,15 +112,10 @@ def geom_inertia(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, 
     return pin.SE3(M).act(dense)
 
 
-def _of_mesh(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, kind: str, where: str) -> pin.Inertia:
-    """Return the inertia of a mesh of density one."""
-    mesh, way_out = assets.find(geom, where), 'state <inertial> in the body, or mass="0"'
-    if kind != "mesh":
-        raise reader.fail(where, f"has its mass from a {kind} around a mesh, which is not supported; {way_out}")
-    try:
-        return mesh_inertia(mesh)
-    except ValueError as error:
-        raise reader.fail(where, f"has its mass from mesh {geom.get('mesh')!r}, which {error}; {way_out}") from error
+def _dense(kind: str, sizes: list[float]) -> pin.Inertia:
+    """Return the inertia of a solid of density one."""
+    volume, unit = _solid(kind, sizes)
+    return bare_inertia(volume, np.zeros(3), np.diag(volume * unit))
 
 
 def _solid(kind: str, sizes: list[float]) -> tuple[float, Array]:

@@ -21,7 +21,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.io._build import bare_inertia
 from fivebar_pin.io._mjcf_assets import Mesh
 
-__all__ = ["mesh_inertia"]
+__all__ = ["mesh_inertia", "mesh_points"]
 
 
 def mesh_inertia(mesh: Mesh) -> pin.Inertia:
@@ -31,7 +31,7 @@ def mesh_inertia(mesh: Mesh) -> pin.Inertia:
         ValueError: it cannot be read, or has no volume; says why.
     """
     vertices, faces = _triangles(mesh)
-    corners = (vertices - mesh.position) @ mesh.R * mesh.scale
+    corners = _placed(mesh, vertices)
     if mesh.inertia == "convex" or faces is None:
         triangles = _hull(corners)
     else:
@@ -49,6 +49,19 @@ def mesh_inertia(mesh: Mesh) -> pin.Inertia:
         volume, _, second = _solid(triangles - middle, size)
         first = np.zeros(3)
     return pin.SE3(np.eye(3), middle).act(_inertia(volume, first, second))
+
+
+def mesh_points(mesh: Mesh) -> Array:
+    """Return the points of a mesh (n, 3) [m].
+
+    Raises:
+        ValueError: it cannot be read; says why.
+    """
+    return _placed(mesh, _triangles(mesh)[0])
+
+
+def _placed(mesh: Mesh, vertices: Array) -> Array:
+    return np.asarray((vertices - mesh.position) @ mesh.R * mesh.scale)
 
 
 def _triangles(mesh: Mesh) -> tuple[Array, Array | None]:

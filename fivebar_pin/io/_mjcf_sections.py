@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from xml.etree import ElementTree
 
 from fivebar_pin.errors import UnknownNameError
 from fivebar_pin.io._mjcf_reader import MjcfReader
 
-__all__ = ["check_sections", "gravity"]
+__all__ = ["check_disabled", "check_sections", "disabled", "gravity"]
 
 _SECTIONS = (
     "actuator", "asset", "compiler", "contact", "custom", "default", "deformable", "equality", "extension", "keyframe",
@@ -23,8 +24,12 @@ _LEFT_OUT = {
     "extension/plugin": "plugin",
     "sensor/*": "sensor",
 }
-_OFF = ("constraint", "equality", "spring", "damper", "passive", "frictionloss")
-"""Flags that, disabled, take forces away."""
+_OFF = {
+    "constraint": ("equality", "frictionloss"),
+    "passive": ("spring", "damper"),
+    **{word: (word,) for word in ("equality", "frictionloss", "spring", "damper")},
+}
+"""Flags that, disabled, take forces away: which ones."""
 
 
 def check_sections(reader: MjcfReader, root: ElementTree.Element) -> None:
@@ -41,12 +46,7 @@ def check_sections(reader: MjcfReader, root: ElementTree.Element) -> None:
         raise reader.fail("<compiler>", "global coordinates are not supported; write local ones")
     if reader.compiler.get("inertiafromgeom", "auto") not in ("auto", "true", "false"):
         raise reader.fail("<compiler>", "inertiafromgeom must be auto, true or false")
-    option, flags = reader.merged(root.findall("option")), reader.merged(root.findall("option/flag"))
-    for word in _OFF:
-        if flags.get(word) == "disable":
-            raise reader.fail(
-                "<flag>", f"{word} is disabled, but it acts on the mechanism; remove the flag or the {word}"
-            )
+    option = reader.merged(root.findall("option"))
     fluid = [
         word
         for word in ("density", "viscosity", "wind")
@@ -54,6 +54,19 @@ def check_sections(reader: MjcfReader, root: ElementTree.Element) -> None:
     ]
     if fluid:
         reader.left_out.append(f"{' and '.join(fluid)} of the fluid around it")
+
+
+def disabled(reader: MjcfReader, root: ElementTree.Element) -> set[str]:
+    """Return which forces the flags take away, of equality, frictionloss, spring and damper."""
+    flags = reader.merged(root.findall("option/flag"))
+    return {force for word, forces in _OFF.items() if flags.get(word) == "disable" for force in forces}
+
+
+def check_disabled(reader: MjcfReader, root: ElementTree.Element, acting: Mapping[str, bool]) -> None:
+    """Refuse flags that take away forces that the file states elsewhere; `acting` tells which act, by name."""
+    for force in sorted(disabled(reader, root)):
+        if acting.get(force):
+            raise reader.fail("<flag>", f"{force} is disabled, but the file states it; remove the flag or the {force}")
 
 
 def gravity(reader: MjcfReader, root: ElementTree.Element) -> tuple[float, ...]:

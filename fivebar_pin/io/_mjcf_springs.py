@@ -26,6 +26,8 @@ __all__ = ["joint_springs_to_write", "tendon_lines", "tendon_springs"]
 
 _AUTOMATIC = -1.0
 """MuJoCo's springlength for the length where the springs of all joints are relaxed."""
+_NARROW = 0.1
+"""Share of the way that a fixed tendon goes within its joints' limits, below which its range ties them [-]."""
 _URDF_ONLY = "Save it as URDF only: formats=('urdf',)."
 
 
@@ -40,10 +42,10 @@ def tendon_springs(
         if element.tag not in ("fixed", "spatial"):
             raise reader.fail(where, str(UnknownNameError("tendon", element.tag, ("fixed", "spatial"))))
         full = reader.with_defaults(element, None)
-        _check_spring_alone(reader, bodies, full, where)
+        _check_spring_alone(reader, bodies, element, full, where)
         (stiffness,), (damping,) = (reader.numbers(full, w, 1, where, [0.0]) for w in ("stiffness", "damping"))
         if not stiffness and not damping:
-            if element.get("name", "") not in used:
+            if element.get("name", "") not in used and not bodies.limited(full, "limited", "range", where):
                 reader.left_out.append("idle tendon")
             continue
         length = _stated_length(reader, full, where)
@@ -93,15 +95,34 @@ def tendon_lines(chain: ClosedChain, site: Callable[[str], str]) -> list[str]:
     return lines
 
 
-def _check_spring_alone(reader: MjcfReader, bodies: BodyTree, full: ElementTree.Element, where: str) -> None:
-    """Refuse whatever else than a spring and a damper acts in a tendon."""
+def _check_spring_alone(
+    reader: MjcfReader, bodies: BodyTree, element: ElementTree.Element, full: ElementTree.Element, where: str
+) -> None:
+    """Refuse whatever else than a spring and a damper acts in a tendon.
+
+    A wide range of a fixed one bounds its joints as their own limits do, and is noted; a narrow one ties them.
+    """
     if bodies.limited(full, "limited", "range", where):
-        raise reader.fail(where, "range: limits of tendons are not supported; remove it, or state an <equality>")
+        low, high = reader.numbers(full, "range", 2, where, None)
+        if element.tag != "fixed" or not high - low > _NARROW * _reach(reader, bodies, element, where):
+            raise reader.fail(
+                where, "range: limits that tie bodies are not supported; remove it, or state an <equality>"
+            )
+        reader.left_out.append(f"range of {where}")
     for word in ("frictionloss", "armature", "springyield"):
         if reader.numbers(full, word, 1, where, [0.0])[0]:
             raise reader.fail(where, f"{word} of tendons is not supported; remove it")
     if bodies.limited(full, "actuatorfrclimited", "actuatorfrcrange", where):
         reader.left_out.append(f"actuatorfrcrange of {where}")
+
+
+def _reach(reader: MjcfReader, bodies: BodyTree, element: ElementTree.Element, where: str) -> float:
+    """Return how far the length of a fixed tendon goes within the limits of its joints."""
+    reach = 0.0
+    for joint, r in fixed_ratios(reader, bodies, element, where).items():
+        data = bodies.joints[joint].data
+        reach += abs(r) * (data["upper"][0] - data["lower"][0]) if "upper" in data else np.inf
+    return float(reach)
 
 
 def _only_joint(reader: MjcfReader, element: ElementTree.Element, bodies: BodyTree, where: str) -> tuple[str, float]:

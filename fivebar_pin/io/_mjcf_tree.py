@@ -32,6 +32,9 @@ class BodyTree:
         links, joints, order: what a `TreeEntry` needs, and the moving joints in MuJoCo's order.
         refs: coordinate of hinges and slides as the file places them, where that is not zero [rad or m].
         poses: pose of each link in the world as the file places it.
+        bodies: link of each body.
+        places: pose of each body's link in its parent, as the file places it.
+        compensated: number of bodies with gravcomp.
         sites: link that stands for each named site.
         data: armature and losses per joint.
         springs: on joints, in the order of the joints.
@@ -45,6 +48,8 @@ class BodyTree:
         self.order: list[str] = []
         self.poses: dict[str, Array] = {WORLD: np.eye(4)}
         self.bodies: dict[str, str] = {WORLD: WORLD}
+        self.places: dict[str, Array] = {}
+        self.compensated = 0
         self.sites: dict[str, str] = {}
         self.data: dict[str, dict[str, list[float]]] = {}
         self.springs: list[JointSpring] = []
@@ -90,7 +95,7 @@ class BodyTree:
             raise reader.fail(where, "is defined twice")
         reader.check_known(body, where)
         if any(_plain(reader, body, "gravcomp", where)):
-            reader.left_out.append("gravity compensation")
+            self.compensated += 1
         if body.get("mocap", "false") == "true":
             reader.left_out.append(f"mocap of {where}, which stays where it is")
         childclass = body.get("childclass", above)
@@ -101,6 +106,7 @@ class BodyTree:
         if joints and inertia is not None and inertia.mass == 0.0:
             raise reader.fail(where, "has mass = 0 and moves; give it a mass, or leave <inertial> out if it has none")
         self.bodies[name] = link = self.new_link(name)
+        self.places[link] = pose
         self.chain_of_joints(joints, parent, link, pose, where)
         self.links[link] = LinkEntry(link, inertia)
         self.contents(body, link, where, childclass)
@@ -233,7 +239,7 @@ class BodyTree:
                     continue
                 part = geom_inertia(reader, self.assets, full, f"geom of {where}")
                 total = part if total is None else total if part is None else total + part
-        return total
+        return stated_inertia(reader, stated, where) if total is None and stated is not None else total
 
     def site(self, site: ElementTree.Element, link: str, where: str) -> None:
         name = site.get("name")

@@ -8,6 +8,7 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import Visual
+from fivebar_pin.errors import FiveBarPinError
 from fivebar_pin.io._mjcf_assets import Assets, Mesh
 from fivebar_pin.io._mjcf_mass import geom_shape
 from fivebar_pin.io._mjcf_reader import MjcfReader, homogeneous
@@ -22,17 +23,26 @@ _TURNED = 1e-12  # entry of a rotation between axes that are scaled differently,
 
 def geom_visual(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, link: str, where: str) -> list[Visual]:
     """Return what is drawn of a geom with its defaults; what a chain cannot draw is noted as left out."""
-    kind, sizes, M = geom_shape(reader, geom, where)
     colour = assets.colour(geom, where)
     mesh = assets.find(geom, where) if "mesh" in geom.attrib else None
-    if reader.numbers(geom, "group", 1, where, [0.0])[0] not in _DRAWN:
+    drawn = reader.numbers(geom, "group", 1, where, [0.0])[0] in _DRAWN
+    if mesh is not None and not drawn:
+        return []  # no need to read it
+    try:
+        kind, sizes, M = geom_shape(reader, assets, geom, where)
+    except ValueError as error:
+        if isinstance(error, FiveBarPinError):
+            raise
+        _note(reader, f"mesh {geom.get('mesh')!r}, which {error}")
         return []
-    if kind in _UNDRAWN:
+    if not drawn:
+        return []
+    if kind in _UNDRAWN and mesh is None:
         reader.left_out.append(_UNDRAWN[kind])
         return []
-    if mesh is not None:
+    if kind in ("mesh", "sdf") and mesh is not None:
         placed = _placed(mesh)
-        why = mesh.missing or _why_undrawn(mesh, kind, placed)
+        why = mesh.missing or _why_undrawn(mesh, placed)
         if why or placed is None:
             _note(reader, f"mesh {geom.get('mesh')!r}, which {why}")
             return []
@@ -44,10 +54,8 @@ def geom_visual(reader: MjcfReader, assets: Assets, geom: ElementTree.Element, l
     return [Visual(link, kind, tuple(sizes), M, colour)]  # type: ignore[arg-type]
 
 
-def _why_undrawn(mesh: Mesh, kind: str, placed: Array | None) -> str:
+def _why_undrawn(mesh: Mesh, placed: Array | None) -> str:
     """Return why a mesh that can be read is not drawn, "" where it is."""
-    if kind != "mesh":
-        return f"stands for the {kind} around it and is not drawn"
     if mesh.file is None:
         return "has no file and is not drawn"
     if mesh.file.suffix.lower() not in _READ:

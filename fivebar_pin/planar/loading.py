@@ -25,6 +25,8 @@ def load(
     closures: Iterable[Closure] | None = None,
     actuated: Iterable[str] | None = None,
     gravity: npt.ArrayLike | None = None,
+    fixed_base: bool = False,
+    closure_tolerance: float = 0.0,
     max_bytes: int = MAX_BYTES,
 ) -> ClosedChain:
     """Load a closed chain: a linkage file (YAML with the key `linkage`), or what `fivebar_pin.io.load` reads.
@@ -38,6 +40,8 @@ def load(
         closures: use these instead of the file's closures; with `actuated`, no sidecar is needed. Not for linkages.
         actuated: drive these joints instead of the file's.
         gravity: use this (3,) [m/s2] instead of the file's.
+        fixed_base: hold what floats where it stands, see `ClosedChain.with_fixed_base`.
+        closure_tolerance: how far loops of rounded dimensions may stay open, see `ClosedChain` [m or rad].
         max_bytes: size above which a file is not read.
 
     Returns:
@@ -53,18 +57,21 @@ def load(
     """
     file = _linkage_of(as_path(path))
     if not is_linkage_file(file):
-        return io.load(
+        chain = io.load(
             path, free_flyer=free_flyer, closures=closures, actuated=actuated, gravity=gravity, max_bytes=max_bytes
         )
-    if free_flyer or closures is not None:
-        word = "free_flyer" if free_flyer else "closures"
-        raise InvalidInputError(word, free_flyer or closures, "is for trees (URDF, SDF, MJCF); this is a linkage")
+        chain = chain.with_fixed_base() if fixed_base else chain
+        return chain.with_tolerance(closure_tolerance) if closure_tolerance else chain
+    for word, given in (("free_flyer", free_flyer), ("fixed_base", fixed_base), ("closures", closures is not None)):
+        if given:
+            raise InvalidInputError(word, given, "is for trees (URDF, SDF, MJCF); this is a linkage")
     linkage = load_linkage(file)
     try:
         chain = linkage.chain()
     except FiveBarPinError as error:
         raise FileFormatError(file, str(error)) from error
     chain = chain if actuated is None else chain.with_actuated(actuated)
+    chain = chain.with_tolerance(closure_tolerance) if closure_tolerance else chain
     return chain if gravity is None else chain.with_gravity(gravity)
 
 

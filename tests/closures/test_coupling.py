@@ -651,7 +651,6 @@ def test_mujoco_and_we_read_the_same_rod(tmp_path: Path):
         ),
         ('<equality><joint joint1="a" joint2="b" polycoef="0 1 2 0 0"/></equality>', "is not linear"),
         ('<equality><joint joint1="a" joint="b"/></equality>', "Unknown attribute of <joint_equality> 'joint'"),
-        ('<equality><joint joint1="a" active="false"/></equality>', "is not active"),
         ('<equality><tendon tendon1="t"/></equality>', "Unknown tendon 't'"),
         ("<equality><tendon/></equality>", "needs the attribute 'tendon1'"),
         (
@@ -669,7 +668,10 @@ def test_mujoco_and_we_read_the_same_rod(tmp_path: Path):
             '<site site="s4"/></spatial></tendon><equality><tendon tendon1="t" tendon2="u"/></equality>',
             "ties a spatial tendon to another; only fixed ones",
         ),
-        ('<tendon><fixed name="t" damping="2"><joint joint="a" coef="1"/></fixed></tendon>', "damping of a tendon"),
+        (
+            '<tendon><fixed name="t" frictionloss="2"><joint joint="a" coef="1"/></fixed></tendon>',
+            "frictionloss of tendons",
+        ),
         (
             '<equality><connect name="h" site1="s3" site2="s4"/></equality>'
             '<custom><numeric name="revolute closure h" data="0 0 1"/></custom>',

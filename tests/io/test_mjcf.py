@@ -215,7 +215,11 @@ def test_a_free_joint_and_its_keyframe_come_back(tmp_path: Path) -> None:
             '<tendon><fixed damping="3"><joint joint="jc" coef="1"/></fixed></tendon><option',
             "fixed '0': is a spring on 'jc', which has several degrees of freedom",
         ),
-        ("<option", '<tendon><fixed range="0 1"/></tendon><option', "fixed '0': range: limits of tendons"),
+        (
+            "<option",
+            '<tendon><fixed range="-0.1 0.1"><joint joint="ja" coef="1"/></fixed></tendon><option',
+            "fixed '0': range: limits that tie bodies are not supported; remove it, or state an <equality>",
+        ),
         ("<option", "<tendon><cord/></tendon><option", "Unknown tendon 'cord'; known: fixed, spatial"),
         ('name="jb"', 'name="jb" springyield="1"', "springyield is not supported"),
         (
@@ -255,7 +259,8 @@ def test_a_free_joint_and_its_keyframe_come_back(tmp_path: Path) -> None:
         ("<option", '<compiler inertiafromgeom="yes"/><option', "inertiafromgeom must be auto, true or false"),
         ("<option", '<compiler agle="radian"/><option', "Unknown attribute of <compiler> 'agle'"),
         ("<option", '<compiler boundmass="-"/><option', "boundmass holds '-', which is not a finite number"),
-        ("<option", '<option><flag spring="disable"/></option><option', "spring is disabled, but it acts"),
+        ("<option", '<option><flag passive="disable"/></option><option', "damper is disabled, but the file states it"),
+        ("<option", '<option><flag constraint="disable"/></option><option', "frictionloss is disabled, but the file"),
         ("<option", '<deformable><flex name="f"/></deformable><option', "flex 'f': deformable bodies"),
         ("<worldbody>", '<default class="x"/><worldbody>', "is a class of its own at the top"),
         ('<body name="f"', '<freejoint/><body name="f"', "a free joint must be the only one of its body"),

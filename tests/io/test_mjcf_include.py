@@ -89,6 +89,7 @@ NO_AXIS = '<m><worldbody><body name="x"><joint name="k" axis="0 0 0"/><geom size
         ({"a": '<m><include file="main.xml"/></m>'}, "a.xml", r"\(main.xml -> a.xml -> main.xml\); break the circle"),
         ({"a": '<m><include file="a.xml"/></m>'}, "a.xml", r"\(main.xml -> a.xml -> a.xml\)"),
         ({"a": TWICE, "b": "<m><size/></m>"}, "a.xml", "a file comes once"),
+        ({"a": f'<m><include file="{"x" * 300}"/></m>'}, "a.xml", "there is no file 'xxx"),
         ({"a": "<m/>"}, "a.xml", "is included by main.xml and has nothing in it"),
         ({"a": "<m><include/></m>"}, "a.xml", "<include> needs the attribute 'file'"),
         ({"a": '<m><include file="b.xml"><size/></include></m>'}, "a.xml", "and has no content"),

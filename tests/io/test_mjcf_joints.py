@@ -123,7 +123,7 @@ TENDONS = """<mujoco><default><tendon stiffness="7"/><motor armature="0.1"/></de
 <fixed><joint joint="ja" coef="-2"/></fixed><fixed stiffness="0" actuatorfrcrange="-1 1" name="u">
 <joint joint="jb" coef="4"/></fixed></tendon>
 <actuator><motor tendon="t" gear="3" forcerange="-1 2"/><motor tendon="t" gear="-1" forcerange="-1 2"/>
-<motor tendon="u" damping="0.2" ctrlrange="-1 1" armature="0"/></actuator></mujoco>"""
+<motor tendon="u" damping="0.2" ctrlrange="-1 1" forcerange="-0.5 3" armature="0"/></actuator></mujoco>"""
 
 
 def test_fixed_tendons_of_one_joint_are_its_springs_and_their_motors_its_own(tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_fixed_tendons_of_one_joint_are_its_springs_and_their_motors_its_own(tmp
     assert automatic == JointSpring("ja", 28.0, np.deg2rad(30.0))
     np.testing.assert_allclose(chain.model.armature, [0.1 * (1.5**2 + 0.5**2), 0.0], rtol=1e-15)
     np.testing.assert_allclose(chain.model.damping, [0.0, 0.2 * 16.0], rtol=1e-15)
-    np.testing.assert_array_equal(chain.model.lowerEffortLimit, [-1.0, -4.0])
+    np.testing.assert_array_equal(chain.model.lowerEffortLimit, [-1.0, -2.0])
     np.testing.assert_array_equal(chain.model.upperEffortLimit, [3.5, 4.0])
 
 
@@ -150,7 +150,54 @@ SPLIT = """<mujoco><worldbody><body name="a"><joint name="ja"/><geom size="0.1"/
 
 
 def test_a_motor_on_a_tendon_of_joints_that_couplings_tie_drives_the_first(tmp_path: Path) -> None:
-    assert fb.load(write(tmp_path, SPLIT)).actuated == ("ja",)
+    """Its force is spread over several joints: it bounds the effort of none of them."""
+    bounded = SPLIT.replace('tendon="split"/>', 'tendon="split" forcerange="-1 1" ctrlrange="-1 1"/>')
+    chain = fb.load(write(tmp_path, bounded))
+    assert chain.actuated == ("ja",)
+    assert chain.model.upperEffortLimit[0] > 1e300
+
+
+def test_only_a_motors_control_is_its_force(tmp_path: Path) -> None:
+    for tag, bound in (("motor", 6.0), ("general", np.finfo(float).max)):
+        text = LINKAGE.replace("<motor", f"<{tag}")
+        assert fb.load(write(tmp_path, text)).model.upperEffortLimit[0] == bound
+
+
+def test_equalities_and_their_defaults_may_be_off(tmp_path: Path) -> None:
+    text = LINKAGE.replace('<equality solref="0.01 1"/>', '<equality active="false"/>')
+    with pytest.warns(LeftOutWarning, match="connect 'loop', which is not active, joint 'gear', which is not active"):
+        assert fb.load(write(tmp_path, text)).closures == ()
+
+
+@pytest.mark.parametrize("flag", ["equality", "constraint"])
+def test_equalities_that_a_flag_takes_away_are_off(tmp_path: Path, flag: str) -> None:
+    path = write(tmp_path, LINKAGE.replace("<worldbody>", f'<option><flag {flag}="disable"/></option><worldbody>'))
+    with pytest.warns(LeftOutWarning, match="connect 'loop', which is not active"):
+        assert fb.load(path).closures == ()
+
+
+def test_a_wide_range_of_a_fixed_tendon_is_a_bound_and_is_told(tmp_path: Path) -> None:
+    """The crank's limits let it go 13.96 rad."""
+    tied = '<tendon><fixed name="far" range="-0.7 {}"><joint joint="crank" coef="1"/></fixed>'
+    path = write(tmp_path, LINKAGE.replace("<tendon>", tied.format(0.7), 1))
+    with pytest.warns(LeftOutWarning, match="mechanism: range of fixed 'far'$"):
+        fb.load(path)
+    with pytest.raises(FileFormatError, match="fixed 'far': range: limits that tie bodies"):
+        fb.load(write(tmp_path, LINKAGE.replace("<tendon>", tied.format(0.69), 1)))
+
+
+def test_a_keyframe_without_an_orientation_has_the_neutral_one(tmp_path: Path) -> None:
+    text = '<mujoco><worldbody><body><freejoint name="f"/><geom size="0.1"/></body></worldbody><keyframe>'
+    chain = fb.load(write(tmp_path, text + '<key name="k" qpos="1 2 3 0 0 0 0"/></keyframe></mujoco>'))
+    np.testing.assert_array_equal(chain.references["k"], [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0])
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_array_equal(data.xquat[1], [1.0, 0.0, 0.0, 0.0])
+    with pytest.raises(FileFormatError, match="remove align or alignfree"):
+        text = text.replace("<worldbody>", '<compiler alignfree="true"/><worldbody>')
+        fb.load(write(tmp_path, text + "</keyframe></mujoco>"))
 
 
 @pytest.mark.parametrize(
@@ -163,6 +210,7 @@ def test_a_motor_on_a_tendon_of_joints_that_couplings_tie_drives_the_first(tmp_p
             "joint 'joint_1', which is",
         ),
         ('tendon="split"/>', 'joint="jd"/>', "general 'grip', which drives 'jd' of several degrees of freedom"),
+        ('coef="0.5"/></fixed>', 'coef="-0.5"/></fixed>', "general 'grip', which pulls the tendon 'split' of joints"),
         ('tendon="split"/>', 'site="s"/>', "general 'grip', which drives no joint"),
         ('<general name="grip" tendon="split"/>', '<adhesion body="a"/>', "adhesion '0', which drives no joint"),
     ],

@@ -147,8 +147,12 @@ def test_springs_are_read_with_defaults_angles_and_automatic_lengths(tmp_path: P
         ('site="t"/>', 'site="u"/>', "spatial 'first': Unknown site 'u'"),
         ('<site site="t"/>', '<site site="t"/><site site="s"/>', "goes over 3 sites; a spring joins two"),
         ('<site site="t"/>', '<geom geom="t"/>', "goes over a <geom>; a spring joins two sites in a straight line"),
-        ('name="first"', 'name="first" range="0 1"', "range: limits of tendons are not supported"),
-        ('name="first"', 'name="first" limited="true"', "range: limits of tendons are not supported"),
+        (
+            'name="first"',
+            'name="first" range="0 1"',
+            "spatial 'first': range: limits that tie bodies are not supported",
+        ),
+        ('name="first"', 'name="first" limited="true"', "spatial 'first': needs the attribute 'range'"),
         ('name="first"', 'name="first" frictionloss="1"', "frictionloss of tendons is not supported"),
         ('name="first"', 'name="first" stifness="1"', "Did you mean 'stiffness'"),
         ('springlength="0.25"', 'springlength="0.2 0.3"', "a dead band is not supported"),
@@ -160,6 +164,12 @@ def test_springs_are_read_with_defaults_angles_and_automatic_lengths(tmp_path: P
             "<actuator>",
             '<custom><numeric name="unbounded ja" data="1"/></custom><actuator>',
             "stiffness of a hinge that does not count its turns",
+        ),
+        (
+            "<actuator>",
+            '<custom><numeric name="unbounded jc" data="1"/></custom><worldbody><body><joint name="jc" ref="1" '
+            'stiffness="0"/></body></worldbody><actuator>',
+            "joint 'jc': ref of a hinge that does not count its turns",
         ),
     ],
 )
