@@ -104,7 +104,8 @@ def read_joint(reader: Reader, frames: Frames, thing: Thing, version: float) -> 
     if kind == GEARBOX:
         (ratio,) = text_numbers(reader, element, "gearbox_ratio", 1, where, [1.0])
         reference = _end(reader, frames, thing, "gearbox_reference_body")
-    mimic = _mimic(reader, thing, where) if element.find("axis/mimic") is not None else None
+    stated = element.find("axis/mimic")
+    mimic = None if stated is None else _mimic(reader, thing, stated, where)
     return SdfJoint(name, kind, parent, child, pose, axes, damping, pitch, ratio, reference, mimic)
 
 
@@ -176,10 +177,8 @@ def _pitch(reader: Reader, element: ElementTree.Element, where: str) -> float:
     return turn / (2.0 * np.pi) if turn else -1.0 / older
 
 
-def _mimic(reader: Reader, thing: Thing, where: str) -> Coupling:
+def _mimic(reader: Reader, thing: Thing, mimic: ElementTree.Element, where: str) -> Coupling:
     """Return q = multiplier (q_leader - reference) + offset as a coupling."""
-    mimic = thing.element.find("axis/mimic")
-    assert mimic is not None
     leader = thing.scope + reader.text(mimic, "joint", where)
     if mimic.get("axis", "axis") != "axis":
         raise reader.fail(where, "<mimic> follows the second axis of a joint, which is not supported")

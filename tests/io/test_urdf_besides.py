@@ -119,6 +119,8 @@ def test_motors_alone_do_not_close_a_loop(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"has no sidecar: put square\.yaml beside it"):
         io.load(path)
     assert io.load(path, closures=()).actuated == ("a",)
+    with pytest.raises(FileFormatError, match=r"has no sidecar"):  # nothing says which joints are driven
+        io.load(write(tmp_path, ""), closures=())
 
 
 def test_motors_are_the_joints_of_transmissions_and_of_ros2_control(tmp_path: Path) -> None:
