@@ -11,7 +11,7 @@ depends on the units. Springs add constants to the conditions of static balance,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,7 +33,9 @@ __all__ = ["KINDS", "BalanceConditions", "balance_conditions"]
 KINDS = ("force", "moment", "dynamic", "static")
 _SMALL = 1e-6  # a singular value this far below the largest may be counted as zero [-]
 _MOST_SAMPLES = 1_000_000  # configurations; their rows are held in memory at once
+_MOMENTS = ("moment", "dynamic")  # kinds that ask for the moment
 _CLEAR = 1e3  # ratio of neighbouring singular values that counts as a clear decision [-]
+_WAYS = 4  # velocities that a configuration is looked at with: a basis of them, or so many at random
 _DOUBLINGS = 4  # how often the samples are doubled while the decision is not clear
 _NOTHING = 1e-12  # a largest singular value below this is that of a mechanism that cannot be felt at all [-]
 _ZERO = 1e-17  # what a singular value of zero counts as, so that a full rank is a gap too [of the largest]
@@ -183,7 +185,7 @@ def balance_conditions(
     integer("seed", seed)
     point = checked("about", about, (3,))
     weight = _gravity(chain, gravity) if kind == "static" else None
-    drawn = random_samples(chain, int(count), near=near, seed=seed)
+    drawn = _few_ways(random_samples(chain, int(count), near=near, seed=seed))
     found = space_of(chain, drawn, space)
     acting = kind == "static" and springs_act(chain, drawn)
     pull = required_gravity(chain, weight) if acting else 1.0
@@ -199,7 +201,7 @@ def balance_conditions(
         rank, gap = _gap(s)
         if not rank or (gap >= _CLEAR and stacked > rank):
             break
-        drawn = random_samples(chain, 2 * used, near=near, seed=seed, skip=used)
+        drawn = _few_ways(random_samples(chain, 2 * used, near=near, seed=seed, skip=used))
     else:
         raise SolverError(
             f"the singular values of the {kind} conditions of {chain.name} show no clear gap (best ratio {gap:.3g} "
@@ -255,25 +257,38 @@ def conditions_for(
     return given
 
 
-def momentum_rows(chain: ClosedChain, samples: Samples, space: Space, about: Array) -> tuple[Array, Array]:
-    """Return scaled momentum regressors: linear (k, 2 or 3, P) and angular (k, 1 or 3, P) for k = na n velocities."""
+def momentum_rows(
+    chain: ClosedChain, samples: Samples, space: Space, about: Array, *, force: bool, moment: bool
+) -> tuple[Array, Array]:
+    """Return scaled momentum regressors for each of the velocities N, none of those that are not asked for.
+
+    Linear (k, 2 or 3, P) and angular (k, 1 or 3, P).
+    """
     loops = loops_of(chain)
     to_space = space.injection() * space.scale
+    axes, plane = (np.eye(3), 3) if space.normal is None else (plane_axes(space.normal), 2)
     linear, angular = [], []
-    for k in range(chain.na):
+    for k in range(samples.N.shape[2]):
         v = samples.N[:, :, k]
         unit = np.abs(v / loops.column_scale).max(axis=1, keepdims=True)
         Y = BodyMotion.of(loops, samples.q, v / unit, poses=samples.poses).momentum()
         Y = np.swapaxes(Y, 1, 2).reshape(len(samples), 6, -1)
-        moment = Y[:, 3:] - np.matmul(skew(about), Y[:, :3])
-        force = Y[:, :3] / space.length
-        moment = moment / space.length**2
-        if space.normal is not None:
-            axes = plane_axes(space.normal)
-            force, moment = np.matmul(axes[:2], force), np.matmul(axes[2:], moment)
-        linear.append(force @ to_space)
-        angular.append(moment @ to_space)
-    return np.concatenate(linear), np.concatenate(angular)
+        if force:
+            linear.append(np.matmul(axes[:plane], Y[:, :3] / space.length) @ to_space)
+        if moment:
+            about_point = (Y[:, 3:] - np.matmul(skew(about), Y[:, :3])) / space.length**2
+            angular.append(np.matmul(axes[plane % 3 :], about_point) @ to_space)
+    none = np.zeros((0, 3, to_space.shape[1]))
+    return np.concatenate(linear or [none]), np.concatenate(angular or [none])
+
+
+def _few_ways(samples: Samples) -> Samples:
+    """Return samples with some random velocities instead of a basis where that is large: other samples have others."""
+    n, _, na = samples.N.shape
+    if na <= _WAYS:
+        return samples
+    mix = np.random.default_rng(n).normal(size=(n, na, _WAYS))
+    return replace(samples, N=frozen(np.matmul(samples.N, mix / np.linalg.norm(mix, axis=1, keepdims=True))))
 
 
 def _gravity(chain: ClosedChain, gravity: npt.ArrayLike | str) -> Array | None:
@@ -292,7 +307,7 @@ def _gravity(chain: ClosedChain, gravity: npt.ArrayLike | str) -> Array | None:
 
 def _rows(chain: ClosedChain, samples: Samples, space: Space, kind: str, gravity: Array | None, about: Array) -> Array:
     """Stack the scaled rows that must vanish, (rows, P)."""
-    linear, angular = momentum_rows(chain, samples, space, about)
+    linear, angular = momentum_rows(chain, samples, space, about, force=kind != "moment", moment=kind in _MOMENTS)
     if kind == "static" and gravity is not None:  # N^T g(q) = -g . (linear momentum at N e_k)
         axes = np.eye(3) if space.normal is None else plane_axes(space.normal)[:2]
         linear = np.matmul(axes @ (gravity / float(np.linalg.norm(gravity))), linear)[:, None]

@@ -19,6 +19,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import AssemblyError, InvalidInputError, UnknownNameError
 from fivebar_pin.mechanism.closing import Limits, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.plane import plane_normal
@@ -83,6 +84,7 @@ def random_samples(
         AssemblyError: too few configurations close, or `near` is not closed.
         InvalidInputError: nothing is actuated, the motion is left undetermined, or `near` is beyond a limit.
     """
+    chain = at_rest(chain)
     loops = loops_of(chain)
     loops.require_determined()
     if not chain.na:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, seal
+from fivebar_pin._arrays import Array, Immutable, all_of, checked, frozen, number, seal
 from fivebar_pin.chain.checks import check_actuated, check_closures, check_tree
 from fivebar_pin.chain.coordinates import q_slice, v_slice
 from fivebar_pin.chain.counting import counting_turns
@@ -24,6 +24,9 @@ from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["ClosedChain"]
+
+_COARSE = 1e-3  # closure tolerance from which on dimensions are wrong rather than rounded [m or rad]
+_FLOATING = 6  # degrees of freedom of a joint that holds nothing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +44,10 @@ class ClosedChain(Immutable):
         visuals: shapes to draw.
         springs: springs and dampers between frames and on joints; all dynamics and balancing take them from here.
         geometry: named lengths and placements, and how joints, frames and bodies follow them; none unless given.
+        closure_tolerance: how far the loops of a model with rounded dimensions stay open where nothing closes them
+            further [m or rad; times its length above 1 m]. Up to there closures count as met, in the sense of least
+            squares, and rows of theirs that contradict each other by no more as one. Zero for dimensions that are
+            exact.
 
     Raises:
         InvalidInputError: a closure within one body, a joint named twice or with several degrees of freedom, a spring
@@ -55,6 +62,7 @@ class ClosedChain(Immutable):
     visuals: tuple[Visual, ...] = ()
     springs: tuple[Spring | JointSpring, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
+    closure_tolerance: float = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, pin.Model):
@@ -65,6 +73,10 @@ class ClosedChain(Immutable):
         object.__setattr__(self, "name", self.name or self.model.name or "mechanism")
         if not isinstance(self.geometry, Geometry):
             raise InvalidInputError("geometry", self.geometry, "must be a Geometry")
+        tolerance = number("closure tolerance", self.closure_tolerance)
+        if not 0.0 <= tolerance <= _COARSE:
+            raise InvalidInputError("closure tolerance", tolerance, f"must be from 0 to {_COARSE:g} m or rad")
+        object.__setattr__(self, "closure_tolerance", tolerance)
         put_in_place(self.model, self.geometry)
         check_tree(self.model)
         check_closures(self.model, self.closures)
@@ -208,9 +220,30 @@ class ClosedChain(Immutable):
         model.gravity.linear = np.array(checked("gravity", gravity, (3,)))
         return replace(self, model=model)
 
+    def with_fixed_base(self, q: npt.ArrayLike | None = None) -> ClosedChain:
+        """Return the same mechanism with what floats on the ground held where it stands.
+
+        Args:
+            q: configuration (nq,) that tells where; the first of `references` unless given, else the neutral one.
+
+        Raises:
+            InvalidInputError: nothing floats, or q of the wrong shape.
+        """
+        model = self.model
+        floating = [j for j in range(1, model.njoints) if not model.parents[j] and model.nvs[j] == _FLOATING]
+        if not floating:
+            raise InvalidInputError("base", "fixed", "does not float: no joint of six degrees of freedom on the ground")
+        stands = next(iter(self.references.values()), pin.neutral(model)) if q is None else q
+        fixed = pin.buildReducedModel(model, floating, np.array(checked("q", stands, (self.nq,))))
+        return replace(self, model=fixed)
+
     def with_actuated(self, actuated: Iterable[str]) -> ClosedChain:
         """Return the same mechanism driven at other joints."""
         return replace(self, actuated=all_of("actuated", actuated, str))
+
+    def with_tolerance(self, closure_tolerance: float) -> ClosedChain:
+        """Return the same mechanism with closures that may stay open by so much [m or rad]."""
+        return replace(self, closure_tolerance=closure_tolerance)
 
     def with_springs(self, springs: Iterable[Spring | JointSpring]) -> ClosedChain:
         """Return the same mechanism with these springs in place of its own."""

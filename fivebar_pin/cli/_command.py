@@ -10,6 +10,7 @@ import argparse
 import contextlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import NoReturn
@@ -87,7 +88,9 @@ def _run(chosen: argparse.Namespace) -> int:
 
     if chosen.command not in _WITHOUT_ENGINE:
         compile_once()
-    with np.errstate(all="ignore"):  # the library refuses results that are not finite; numpy's warnings only add lines
+    # the library refuses results that are not finite; numpy's warnings only add lines
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: _say(f"fivebar-pin {chosen.command}: note: {message}")
         return int(chosen.run(chosen))
 
 

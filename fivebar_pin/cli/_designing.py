@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any
 
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.cli._load import add_gravity
+from fivebar_pin.cli._load import add_reading
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.trajectory import Trajectory
 
@@ -38,7 +38,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--kind", choices=KINDS, metavar="KIND", default="force", help="what is to vanish: %(choices)s [force]"
     )
-    add_gravity(parser)
+    add_reading(parser)
     parser.add_argument(
         "--along",
         type=float,

@@ -1,9 +1,8 @@
-"""Loading what a user names on the command line, under the gravity that is asked for."""
+"""Loading what a user names on the command line, as the options say that every command has."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 
 from fivebar_pin.chain import ClosedChain
 
@@ -19,8 +18,25 @@ def add_gravity(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def load_any(path: str, gravity: Sequence[float] | None = None) -> ClosedChain:
-    """Load a file, a linkage among them, a folder or a mechanism that ships."""
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options about a mechanism that is read from a file."""
+    add_gravity(parser)
+    parser.add_argument("--fixed-base", action="store_true", help="hold a floating base where it stands")
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="T",
+        help="how far loops of rounded dimensions may stay open [m or rad]",
+    )
+
+
+def load_any(chosen: argparse.Namespace) -> ClosedChain:
+    """Load a file, a linkage among them, a folder or a mechanism that ships, as it was chosen."""
     from fivebar_pin.planar.loading import load
 
-    return load(path, gravity=gravity)
+    return load(
+        chosen.path,
+        gravity=chosen.gravity,
+        fixed_base=chosen.fixed_base,
+        closure_tolerance=0.0 if chosen.tolerance is None else chosen.tolerance,
+    )

@@ -7,42 +7,57 @@ import numpy as np
 from fivebar_pin import motion as laws
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.errors import AssemblyError, SingularityError
+from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityError
 from fivebar_pin.kinematics import assemble, drive
-from fivebar_pin.mechanism.loops import loops_of
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
+from fivebar_pin.mechanism.loops import loops_of, open_message
+from fivebar_pin.mechanism.mobility import first_closed
 from fivebar_pin.trajectory import Trajectory
 
 
-def motion_along(chain: ClosedChain, file: str | None) -> Trajectory:
-    """Move the chain as the file says, else let its motors sway as far as they can, else let it stand."""
+def motion_along(chain: ClosedChain, file: str | None, *, stand: bool = False) -> Trajectory:
+    """Move the chain as the file says, else let its motors sway as far as they can, else let it stand.
+
+    Args:
+        chain: the mechanism.
+        file: of the motion.
+        stand: let it stand, too, where motors do not determine how it moves.
+    """
     if file is not None:
         return drive(chain, laws.from_file(file, chain.actuated))
     q0 = standing(chain)
-    swaying = sway(chain, q0)
-    if swaying is not None:
-        return swaying
-    at = loops_of(chain).actuated_of(q0[None])
-    rest = np.zeros((1, chain.na))
-    return drive(chain, laws.Motion(np.zeros(1), at, rest, rest), near=q0, limits="ignore")
+    try:
+        swaying = sway(chain, q0)
+        if swaying is not None:
+            return swaying
+        at = loops_of(chain).actuated_of(q0[None])
+        rest = np.zeros((1, chain.na))
+        return drive(chain, laws.Motion(np.zeros(1), at, rest, rest), near=q0, limits="ignore")
+    except InvalidInputError:
+        if not stand:
+            raise
+        still, N = np.zeros((1, chain.nv)), np.full((1, chain.nv, chain.na), np.nan)
+        return Trajectory(np.zeros(1), q0[None], still, still, N, np.zeros(1))
 
 
 def standing(chain: ClosedChain) -> Array:
-    """Return some assembled configuration: the model's own reference if it has one that closes."""
+    """Return some assembled configuration: the model's own reference if it has one that closes.
+
+    Raises:
+        AssemblyError: none was found.
+    """
     import pinocchio as pin
 
     loops = loops_of(chain)
     for q in [*chain.references.values(), pin.neutral(chain.model)]:
         try:
             return assemble(chain, loops.actuated_of(q[None])[0], q)
-        except (AssemblyError, SingularityError):
+        except (AssemblyError, SingularityError, InvalidInputError):
             continue
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        try:
-            return assemble(chain, rng.uniform(-np.pi, np.pi, chain.na) * loops.column_scale[chain.actuated_index])
-        except AssemblyError as error:
-            last = error
-    raise last
+    q, gap = first_closed(chain, 0, CLOSED)
+    if not closed_enough(loops, gap, CLOSED):
+        raise open_message(loops, residual_of(loops, q[None])[0], "anywhere that was looked")
+    return q
 
 
 def sway(chain: ClosedChain, q0: Array, *, samples: int = 121, period: float = 2.0) -> Trajectory | None:

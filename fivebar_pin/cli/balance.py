@@ -60,7 +60,7 @@ def run(chosen: argparse.Namespace) -> int:
     from fivebar_pin.balancing import balance, realise
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
-    chain = load_any(chosen.path, chosen.gravity)
+    chain = load_any(chosen)
     trajectory = motion_along(chain, chosen.motion)
     minimise = {name: 1.0 if value is None else value for name, value in pairs("--minimise", chosen.minimise)}
     limits = {name: given_number("--limit", name, value) for name, value in pairs("--limit", chosen.limit)}

@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from fivebar_pin.chain import ClosedChain
+from fivebar_pin.cli._load import add_reading, load_any
 
 
 def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,15 +20,15 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     parser.add_argument(
         "--motion", metavar="CSV", help="compare the two roads of inverse dynamics along it (t, q_*, ...)"
     )
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Diagnose and print."""
-    from fivebar_pin.cli._load import load_any
     from fivebar_pin.diagnosis import diagnose
 
-    chain = load_any(chosen.path)
+    chain = load_any(chosen)
     diagnosis = diagnose(chain)
     sys.stdout.write(f"{diagnosis}\n")
     if chosen.motion is not None:

@@ -1,4 +1,4 @@
-"""`fivebar-pin close`: find the loops of an open URDF and write the sidecar that closes them."""
+"""`fivebar-pin close`: find the loops of an open URDF or SDF and write the sidecar that closes them."""
 
 from __future__ import annotations
 
@@ -34,13 +34,16 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     """Add the command to the parser."""
     parser = commands.add_parser(
         "close",
-        help="find the loops of an open URDF, propose motors and write the sidecar",
+        help="find the loops of an open URDF or SDF, propose motors and write the sidecar",
         description="Look for frames named for a loop, one point named on two bodies, and frames and hinges that "
-        "coincide; write the closures and motors as the sidecar beside the URDF. Exit code 1 when nothing is found, "
+        "coincide; write the closures and motors as the sidecar beside the file. Exit code 1 when nothing is found, "
         "or when check would refuse what is written.",
     )
-    parser.add_argument("path", help="URDF file, or a folder with one; couplings and what else a sidecar says are kept")
-    parser.add_argument("--out", metavar="PATH", help="sidecar to write; the URDF's name ending in .yaml unless given")
+    parser.add_argument(
+        "path",
+        help="URDF, SDF or xacro file, or a folder with one; what it closes itself and what a sidecar says is kept",
+    )
+    parser.add_argument("--out", metavar="PATH", help="sidecar to write; the file's name ending in .yaml unless given")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing sidecar")
     parser.add_argument(
         "--kind", metavar="K", help="kind of all closures (3d, 6d, revolute); the one that suits each loop unless given"
@@ -57,24 +60,25 @@ def run(chosen: argparse.Namespace) -> int:
     """Propose, print and write."""
     from fivebar_pin import io
     from fivebar_pin.diagnosis import diagnose, propose_closures, propose_motors
-    from fivebar_pin.io._load import sidecar_file, stated_couplings
+    from fivebar_pin.io._find import sidecar_file, stem
+    from fivebar_pin.io._load import stated_closures
 
-    urdf = _urdf(chosen.path)
-    there = sidecar_file(urdf)
-    file = as_path(chosen.out) if chosen.out is not None else there or urdf.with_suffix(".yaml")
+    tree = _tree(chosen.path)
+    there = sidecar_file(tree)
+    file = as_path(chosen.out) if chosen.out is not None else there or tree.with_name(f"{stem(tree)}.yaml")
     if not chosen.dry_run:
         check_new(file, overwrite=chosen.overwrite)
-    mimics, gears = stated_couplings(urdf)
-    chain = io.load(urdf, closures=(*gears, *mimics), actuated=())
+    own, gears = stated_closures(tree)
+    chain = io.load(tree, closures=(*gears, *own), actuated=())
     console = _tables.console()
     proposals = propose_closures(chain, pairs=[(a, b) for a, b in chosen.pair], kind=chosen.kind)
     _closures_table(console, chain, proposals)
     closures = tuple(p.closure for p in proposals if p.chosen)
     if not closures and not chain.closures:
         raise _nothing(chain, proposals)
-    closed = replace(chain, closures=(*gears, *closures, *mimics))
+    closed = replace(chain, closures=(*gears, *closures, *own))
     if chain.closures:
-        console.print(f"couplings that are stated already: {', '.join(c.name for c in chain.closures)}", soft_wrap=True)
+        console.print(f"stated already: {', '.join(c.name for c in chain.closures)}", soft_wrap=True)
     motors = {name: "given" for name in chosen.motor} or {m.joint: m.reason for m in propose_motors(closed)}
     closed = closed.with_actuated(motors)
     _tables.table(console, "motors", ("joint", "why"), list(motors.items()))
@@ -88,13 +92,13 @@ def run(chosen: argparse.Namespace) -> int:
     return 0 if diagnosis.ok else 1
 
 
-def _urdf(path: str) -> Path:
-    """Return the URDF file that is meant."""
-    from fivebar_pin.io._load import mechanism_file
+def _tree(path: str) -> Path:
+    """Return the file of a tree that is meant."""
+    from fivebar_pin.io._find import TREES, mechanism_file
 
     file = mechanism_file(as_path(path))
-    if file.suffix.lower() != ".urdf":
-        raise FileFormatError(file, "is no .urdf file; a sidecar closes the loops of a URDF only")
+    if file.suffix.lower() not in TREES:
+        raise FileFormatError(file, f"is none of {', '.join(TREES)}; a sidecar closes the loops of such a tree only")
     return file
 
 

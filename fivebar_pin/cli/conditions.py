@@ -25,7 +25,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Find and print the conditions, and how far the mechanism is from them."""
     from fivebar_pin.balancing import balance_conditions
 
-    chain = load_any(chosen.path, chosen.gravity)
+    chain = load_any(chosen)
     near = motion_along(chain, chosen.motion).q[0] if chosen.branch == "motion" else None
     conditions = balance_conditions(chain, chosen.kind, gravity=direction(chosen, chain), near=near)
     console = _tables.console()

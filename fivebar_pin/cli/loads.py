@@ -10,7 +10,7 @@ from fivebar_pin._arrays import figures
 from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
-from fivebar_pin.cli._load import add_gravity, load_any
+from fivebar_pin.cli._load import add_reading, load_any
 from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.dynamics import Loads, inverse_dynamics
 from fivebar_pin.trajectory import Trajectory
@@ -24,7 +24,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--motion", metavar="CSV", help="motion of the actuated joints (t, q_*, v_*, a_*); unless given, they sway"
     )
     parser.add_argument("--about", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "Z"))
-    add_gravity(parser)
+    add_reading(parser)
     parser.add_argument("--out", metavar="FOLDER", help="write the curves, plots and an animation there")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
     parser.set_defaults(run=run)
@@ -34,7 +34,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Move the mechanism and print what it takes."""
 
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
-    chain = load_any(chosen.path, chosen.gravity)
+    chain = load_any(chosen)
     trajectory = motion_along(chain, chosen.motion)
     loads = inverse_dynamics(chain, trajectory, about=chosen.about)
     files: tuple[Path, ...] = ()

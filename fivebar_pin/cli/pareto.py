@@ -32,7 +32,7 @@ def run(chosen: argparse.Namespace) -> int:
 
     integer("--points", chosen.points, least=2, most=_MOST_POINTS)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
-    chain = load_any(chosen.path, chosen.gravity)
+    chain = load_any(chosen)
     options = options_of(chosen, chain, motion_along(chain, chosen.motion))
     console = _tables.console()
     with _tables.progress().status("tracing the front"):

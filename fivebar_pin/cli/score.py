@@ -14,7 +14,7 @@ from fivebar_pin._arrays import Array, figures, integer
 from fivebar_pin._files import as_path, check_new, read_bounded, write_file
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
-from fivebar_pin.cli._load import add_gravity, load_any
+from fivebar_pin.cli._load import add_reading, load_any
 from fivebar_pin.cli._moving import motion_along
 from fivebar_pin.errors import FileFormatError, InvalidInputError
 
@@ -53,7 +53,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "--best", type=int, default=5, metavar="K", help="how many designs to list, by the first term [5]"
     )
     parser.add_argument("--out", metavar="CSV", help="write all scores as a table")
-    add_gravity(parser)
+    add_reading(parser)
     parser.set_defaults(run=run)
 
 
@@ -63,7 +63,7 @@ def run(chosen: argparse.Namespace) -> int:
 
     integer("--best", chosen.best, least=1)
     out = check_new(chosen.out, overwrite=False) if chosen.out is not None else None
-    chain = load_any(chosen.path, chosen.gravity)
+    chain = load_any(chosen)
     if chosen.designs is not None:
         designs = _read(as_path(chosen.designs), chain)
     else:

@@ -11,7 +11,7 @@ from fivebar_pin._arrays import figures, integer
 from fivebar_pin._files import check_folder, write_set
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.cli import _output, _tables
-from fivebar_pin.cli._load import add_gravity, load_any
+from fivebar_pin.cli._load import add_reading, load_any
 from fivebar_pin.dynamics import energy_balance
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.simulation import simulate
@@ -26,7 +26,7 @@ def register(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     parser.add_argument("--time", type=float, default=2.0, help="time to simulate [2 s]")
     parser.add_argument("--samples", type=int, default=201, help="output samples [201]")
     parser.add_argument("--torque", type=float, nargs="+", help="constant torque of each actuated joint [0]")
-    add_gravity(parser)
+    add_reading(parser)
     parser.add_argument("--out", metavar="FOLDER", help="write the motion and an animation there")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
     parser.set_defaults(run=run)
@@ -43,7 +43,7 @@ def run(chosen: argparse.Namespace) -> int:
         raise InvalidInputError("--time", chosen.time, f"must be positive and finite, {_LONGEST:g} at most [s]")
     integer("--samples", chosen.samples, least=2, most=_output.MOST_SAMPLES)
     folder = check_folder(chosen.out, overwrite=chosen.overwrite) if chosen.out is not None else None
-    chain = load_any(chosen.path, chosen.gravity)
+    chain = load_any(chosen)
     q0, t = standing(chain), np.linspace(0.0, chosen.time, chosen.samples)
     torque = _torque(chain, chosen.torque)
     console = _tables.console()

@@ -20,6 +20,7 @@ from fivebar_pin.dynamics.wrenches import require_frames
 from fivebar_pin.engine.tables import Integers
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.kinematics import FrameMotion
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.prepared import prepared_of
 
@@ -93,7 +94,8 @@ class Evaluator:
         """Prepare a mechanism; the first evaluator of a process loads the engine, the first of all compiles it.
 
         Args:
-            chain: the mechanism, its motion determined by its actuated joints.
+            chain: the mechanism, its motion determined by its actuated joints. Freedoms that move nothing else are
+                held at rest (`forward_dynamics` lets them move).
             near: configuration (nq,) to start from, closed or nearly so. Without it the model's named configurations
                 (`chain.references`), the neutral and random ones are tried.
             about: point (3,) that shaking and frame moment refer to [m], world.
@@ -105,6 +107,7 @@ class Evaluator:
         """
         from fivebar_pin.engine.single import memory_of
 
+        chain = at_rest(chain)
         loops_of(chain).require_determined()
         point, ready = checked("about", about, (3,)), prepared_of(chain)
         self._bind(chain, *memory_of(ready.I, ready.W, point))

@@ -10,8 +10,10 @@ from fivebar_pin._arrays import Array, checked, frozen, integer
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.diagnosis.findings import (
     GIVEN,
+    ROUNDED,
     STILL,
     about_actuation,
+    about_idle,
     about_inertia,
     about_mobility,
     about_parts,
@@ -28,6 +30,7 @@ from fivebar_pin.mechanism import mobility
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
 from fivebar_pin.mechanism.complement import rates_of
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest, idle_freedoms
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
@@ -36,6 +39,7 @@ __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "
 
 Mask = npt.NDArray[np.bool_]
 
+_ROUNDING = 1e-4  # residual that may come from rounded dimensions [m or rad]
 _SETS = 12  # actuated sets listed
 _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 
@@ -56,6 +60,9 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         InvalidInputError: q of the wrong shape or not finite.
     """
     integer("seed", seed)
+    bare, chain = chain, at_rest(chain)
+    rests = len(chain.closures) - len(bare.closures)
+    idle = idle_freedoms(bare) if rests else ()
     loops = loops_of(chain)
     findings: list[Finding] = []
     start, gap = _start(chain, q, seed, findings)
@@ -64,9 +71,9 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     if q is None and here.rank < generic.rank:
         findings.append(Finding("warning", jump(chain, here, generic, "the configuration nearest to the neutral one")))
         here, gap = generic, float(generic.gap[0])
-    determinate = _determinate(chain, here.q[0])
+    determinate = _determinate(bare, here.q[0])
     if q is None and here is not generic:
-        usual = _determinate(chain, generic.q[0])
+        usual = _determinate(bare, generic.q[0])
         if any(np.any(there & ~then) for there, then in zip(determinate, usual, strict=True)):
             # The neutral configuration lies flat: rows that share a load elsewhere have none to share there.
             here, gap, determinate = generic, float(generic.gap[0]), usual
@@ -75,22 +82,27 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
     redundant = _redundant_rows(loops, here, generic)
     sigma = mobility.passive_sigma(loops, here.J[0], loops.actuated)
     apart = _roads_apart(chain, here) if actuation is Actuation.EXACT and sigma >= SINGULAR else None
-    findings += about_roads(apart)
-    findings += about_mobility(chain, here, generic, redundant)
-    findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
-    findings += about_singularity(chain, here, generic, actuation, sigma)
-    findings += about_parts(chain, here, generic)
-    findings += about_inertia(chain, generic)
+    closed = _is_closed(loops, start)
+    if closed:
+        findings += about_roads(apart)
+        findings += about_idle(idle)
+        findings += about_mobility(chain, here, generic, redundant, is_tree=not bare.closures)
+        findings += about_actuation(chain, actuation, undetermined, excess, sets, generic)
+        findings += about_singularity(chain, here, generic, actuation, sigma)
+        findings += about_parts(chain, here, generic, idle)
+    findings += about_inertia(chain, generic, closed)
     return Diagnosis(
         name=chain.name,
         q=frozen(here.q[0]),
         gap=gap,
-        rows=loops.m,
-        rank=here.rank,
-        generic_rank=generic.rank,
+        closed=closed,
+        rows=loops.m - rests,
+        rank=here.rank - rests,
+        generic_rank=generic.rank - rests,
         mobility=chain.nv - here.rank,
         generic_mobility=chain.nv - generic.rank,
-        singular_values=frozen(singular_values(loops.scaled(here.J[0]))),
+        idle=idle,
+        singular_values=frozen(singular_values(loops.scaled(here.J[0])[: loops.m - rests])),
         redundant=redundant,
         actuated=chain.actuated,
         actuation=actuation,
@@ -104,10 +116,10 @@ def diagnose(chain: ClosedChain, q: npt.ArrayLike | None = None, *, seed: int = 
         determinate_closures=determinate[1],
         determinate_rows=tuple(
             tuple(name for name, yes in zip(c.closure.row_names, determinate[2][c.rows], strict=True) if yes)
-            for c in loops.anchored
+            for c in loops_of(bare).anchored
         ),
         joints=chain.joints,
-        closures=tuple(c.name for c in chain.closures),
+        closures=tuple(c.name for c in bare.closures),
         springs=tuple(s.name for s in chain.springs),
         problems=tuple(sorted(findings, key=lambda f: _ORDER.index(f.severity))),
     )
@@ -126,7 +138,7 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
     else:
         asked = checked("q", q, (chain.nq,))
         asked = np.array(pin.normalize(chain.model, asked))
-        found = mobility.close_all(chain, asked[None], CLOSED)[0][0]
+        found = mobility.closed_from(chain, asked, CLOSED)
         opened, gap = (float(mobility.gap(loops, x[None])[0]) for x in (found, asked))
         if not _is_closed(loops, asked):
             name, size = loops.worst(residual_of(loops, asked[None])[0])
@@ -139,11 +151,12 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
             )
     if loops.m and not closed_enough(loops, np.array([opened]), GIVEN)[0]:
         name, size = loops.worst(residual_of(loops, found[None])[0])
+        hint = f" {ROUNDED}" if size <= _ROUNDING * max(1.0, loops.length) else ""
         findings.append(
             Finding(
                 "error",
                 f"no configuration that closes the loops was found: closure {name} stays open by {size:.3g} m or rad. "
-                f"Check {loops.what_to_check}.",
+                f"Check {loops.what_to_check}.{hint}",
             )
         )
     elif loops.m and loops.opposed(loops.see(found[None]))[0]:

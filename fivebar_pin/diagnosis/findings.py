@@ -8,17 +8,20 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.chain.coordinates import q_slice
+from fivebar_pin.chain.coordinates import q_slice, v_slice
 from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import Actuation, Finding, RedundantRow
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import Idle, Kind
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = [
     "GIVEN",
+    "ROUNDED",
     "STILL",
     "about_actuation",
+    "about_idle",
     "about_inertia",
     "about_mobility",
     "about_parts",
@@ -30,6 +33,7 @@ __all__ = [
 
 
 GIVEN = 1e-9  # residual up to which a given configuration counts as closed, and as within limits [m or rad]
+ROUNDED = "If its dimensions are rounded, state how far its loops may stay open: closure_tolerance, --tolerance."
 STILL = 1e-8  # scaled speed below which a joint counts as standing still [-]
 _NEAR = 1e-2  # distance to a type 2 singularity that is worth a warning [-]
 _ROADS = 1e-9  # difference of the two roads of inverse dynamics, of what adds up, that is no round-off [-]
@@ -43,14 +47,30 @@ def jump(chain: ClosedChain, here: Configurations, generic: Configurations, wher
     )
 
 
+def about_idle(idle: tuple[Idle, ...]) -> Iterator[Finding]:
+    """Name the freedoms that move nothing else."""
+    for x in idle:
+        if x.kind == Kind.PROP:
+            yield Finding("note", f"{x}: left out of the count")
+        elif x.kind == Kind.BASE:
+            yield Finding("note", f"{x}: held where it stands unless it is simulated")
+        else:
+            yield Finding("warning" if x.kind == Kind.LOOSE else "note", f"{x}: held at rest unless it is simulated")
+
+
 def about_mobility(
-    chain: ClosedChain, here: Configurations, generic: Configurations, redundant: tuple[RedundantRow, ...]
+    chain: ClosedChain,
+    here: Configurations,
+    generic: Configurations,
+    redundant: tuple[RedundantRow, ...],
+    *,
+    is_tree: bool,
 ) -> Iterator[Finding]:
     """Find what keeps the mechanism from moving, or from moving in one way, and rows that are too many."""
-    if not chain.closures:
+    if is_tree:
         yield Finding("note", "there are no closures: this is an open tree")
     if chain.nv == generic.rank:
-        yield Finding("error", "the mechanism cannot move: mobility 0. A closure or its kind is too much.")
+        yield Finding("error", f"the mechanism cannot move: mobility 0. A closure or its kind is too much. {ROUNDED}")
     if here.rank < generic.rank:
         yield Finding("error", jump(chain, here, generic, "this configuration"))
     always, closed = ([r for r in redundant if r.scope == scope] for scope in ("always", "closed"))
@@ -129,7 +149,9 @@ def about_roads(apart: float | None) -> Iterator[Finding]:
         )
 
 
-def about_parts(chain: ClosedChain, here: Configurations, generic: Configurations) -> Iterator[Finding]:
+def about_parts(
+    chain: ClosedChain, here: Configurations, generic: Configurations, idle: tuple[Idle, ...]
+) -> Iterator[Finding]:
     """Find joints that nothing holds, that cannot move, that stand still here or are outside their limits."""
     loops, model = loops_of(chain), chain.model
     looped = np.zeros(chain.nv, dtype=np.bool_)
@@ -143,7 +165,8 @@ def about_parts(chain: ClosedChain, here: Configurations, generic: Configuration
     if len(parts) > 1:
         each = "; ".join(", ".join(part) for part in parts)
         yield Finding("note", f"there are {len(parts)} parts that do not act on each other's motion: {each}")
-    passive = [int(k) for k in loops.passive]
+    resting = {k for x in idle for k in range(chain.nv)[v_slice(model, model.getJointId(x.joint))]}
+    passive = [int(k) for k in loops.passive if int(k) not in resting]
     locked = [k for k in passive if _is_still(generic, k)]
     if locked and chain.nv > generic.rank:
         yield Finding("note", f"the closures never let {', '.join(owners_of(chain, np.array(locked)))} move")
@@ -158,11 +181,14 @@ def about_parts(chain: ClosedChain, here: Configurations, generic: Configuration
         yield Finding("warning", f"the configuration is outside the limits of {names}")
 
 
-def about_inertia(chain: ClosedChain, site: Configurations) -> Iterator[Finding]:
-    """Find bodies that cannot be, and motions without inertia."""
+def about_inertia(chain: ClosedChain, site: Configurations, closed: bool) -> Iterator[Finding]:
+    """Find bodies that cannot be, that have no mass and, where the loops are closed, motions without inertia."""
     for severity, text in inertias.inertia_problems(chain, inertias.normals(chain, site)):
         yield Finding("warning" if severity == "warning" else "error", text)
-    text = inertias.mass_problem(chain, site)
+    massless = inertias.massless_bodies(chain)
+    if massless:
+        yield Finding("note", f"without mass: {', '.join(massless)}")
+    text = inertias.mass_problem(chain, site) if closed else ""
     if text:
         yield Finding("error", text)
 

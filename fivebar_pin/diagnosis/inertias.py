@@ -12,7 +12,7 @@ from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.plane import plane_normal
 
-__all__ = ["inertia_problems", "mass_problem", "normals"]
+__all__ = ["inertia_problems", "mass_problem", "massless_bodies", "normals"]
 
 
 _ROUND_OFF = 1e-9  # of the largest entry [-]
@@ -51,6 +51,14 @@ def inertia_problems(chain: ClosedChain, normal: Array | None) -> list[tuple[str
                 )
             )
     return out
+
+
+def massless_bodies(chain: ClosedChain) -> tuple[str, ...]:
+    """Return the joints whose bodies have neither mass nor moments of inertia, where others have some."""
+    bare = [
+        j for j, I in zip(chain.joints, list(chain.model.inertias)[1:], strict=True) if not (I.mass or I.inertia.any())
+    ]
+    return tuple(bare) if len(bare) < len(chain.joints) else ()
 
 
 def _one_body(inertia: pin.Inertia) -> str:

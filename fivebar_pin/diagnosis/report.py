@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, Immutable
 from fivebar_pin.errors import UnknownNameError
+from fivebar_pin.mechanism.idle import Idle
 
 __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "Severity", "apart_in_words"]
 
@@ -98,10 +99,13 @@ class Diagnosis(Immutable):
         name: of the mechanism.
         q: closed configuration the diagnosis holds for (nq,).
         gap: largest closure residual at the configuration that was asked for, else at q [m or rad].
+        closed: whether the loops are closed at q. Where no configuration closes them, q is the nearest one found, and
+            what is said of it (rank, mobility, actuation and so on) is not true of the mechanism.
         rows: number of closure rows.
         rank, generic_rank: rank of the closures here and at almost every closed configuration nearby.
         mobility, generic_mobility: degrees of freedom here and in general.
         singular_values: of the scaled closure Jacobian here, descending [-].
+        idle: freedoms that move nothing else, at rest in any motion that is driven; not counted in the mobilities.
         redundant: rows implied by the others.
         actuated: the driven joints.
         actuation: whether they determine the motion in general.
@@ -127,11 +131,13 @@ class Diagnosis(Immutable):
     name: str
     q: Array
     gap: float
+    closed: bool
     rows: int
     rank: int
     generic_rank: int
     mobility: int
     generic_mobility: int
+    idle: tuple[Idle, ...]
     singular_values: Array
     redundant: tuple[RedundantRow, ...]
     actuated: tuple[str, ...]
@@ -186,7 +192,16 @@ def _lines(d: Diagnosis) -> Iterator[str]:
     changes, general = "", ""
     if d.is_singular:
         changes, general = f" here, {d.generic_mobility} in general (singular)", f" here, {d.generic_rank} in general"
-    yield _entry("mobility", f"{d.mobility}{changes}")
+    if not d.closed:
+        yield _entry("open by", f"{d.gap:.2g} m or rad at best; mobility and actuation are those of closed loops only")
+        yield _entry("closures", f"{', '.join(d.closures)}: {d.rows} rows")
+        yield _entry("actuated", ", ".join(d.actuated) or "none")
+        yield "  findings"
+        for problem in d.problems:
+            yield f"    {problem}"
+        return
+    held = sum(len(x.rest) for x in d.idle)
+    yield _entry("mobility", f"{d.mobility}{changes}{f', and {held} held at rest' if held else ''}")
     yield _entry("closures", f"{', '.join(d.closures) or 'none'}: {d.rows} rows, rank {d.rank}{general}")
     yield _entry("open by", f"{d.gap:.2g} m or rad")
     for k, row in enumerate(d.redundant):

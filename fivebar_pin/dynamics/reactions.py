@@ -14,6 +14,7 @@ from fivebar_pin.dynamics.bodies import Bodies, BodyRates, body_rates, gravity_w
 from fivebar_pin.dynamics.by_factors import carried_by_factors, seen_by_structure, structure_of
 from fivebar_pin.dynamics.elastic import body_wrenches
 from fivebar_pin.dynamics.wrenches import moved_to_origin
+from fivebar_pin.mechanism.idle import at_rest, carried_by_rests
 from fivebar_pin.mechanism.loops import Loops, Seen, loops_of
 from fivebar_pin.mechanism.prepared import prepared_of
 from fivebar_pin.mechanism.rank import Decomposed
@@ -40,6 +41,8 @@ class Reactions(Immutable):
             (n, nb + closures, 6) [N, N m].
         mismatch: largest unbalanced joint torque [N m or N]; round-off when the trajectory is consistent.
         regular: no configuration is singular: the redundancy is that of the structure, everywhere the same.
+        closures: how many of the closures are the mechanism's own. Behind them stands what holds idle freedoms at rest,
+            whose couples are part of those of the joints that they act in.
 
     Components that the closures do not determine (they depend on which of the redundant rows carries the load) are
     nan, judged in the axes they are given in: in a plane that is tilted in the world, the local axes tell more.
@@ -53,11 +56,12 @@ class Reactions(Immutable):
     wrench: Array
     mismatch: float
     regular: bool
+    closures: int
 
     @lazy
     def determinate_rows(self) -> npt.NDArray[np.bool_]:
         """Which multipliers are determinate (n, m)."""
-        rows = np.asarray(np.linalg.norm(self.vanishing, axis=1) <= _OPEN)
+        rows = np.asarray(np.linalg.norm(self.vanishing, axis=1) <= _OPEN)  # those of idle freedoms among them
         rows.setflags(write=False)
         return rows
 
@@ -69,7 +73,7 @@ class Reactions(Immutable):
     @property
     def closure(self) -> Array:
         """Wrench by body 1 on body 2 at the closure point (n, closures, 6) [N, N m]."""
-        return self._in_world[:, self._bodies :]
+        return self._in_world[:, self._bodies : self._own]
 
     @property
     def joint_local(self) -> Array:
@@ -79,12 +83,12 @@ class Reactions(Immutable):
     @property
     def closure_local(self) -> Array:
         """`closure` in the axes of frame 1."""
-        return self._in_own_axes[:, self._bodies :]
+        return self._in_own_axes[:, self._bodies : self._own]
 
     @property
     def forces(self) -> Array:
         """Forces of the joints, then of the closures, of least norm where not determinate (n, nb + closures, 3) [N]."""
-        return self.wrench[..., :3]
+        return self.wrench[:, : self._own, :3]
 
     @property
     def free(self) -> Array:
@@ -92,7 +96,7 @@ class Reactions(Immutable):
 
         For a basis of unit closure forces (n, k, nb + closures, 3) [-].
         """
-        return self._slack[..., :3]
+        return self._slack[:, :, : self._own, :3]
 
     @lazy
     @finite()
@@ -121,6 +125,10 @@ class Reactions(Immutable):
     @property
     def _bodies(self) -> int:
         return int(self.chain.model.njoints) - 1
+
+    @property
+    def _own(self) -> int:
+        return self._bodies + self.closures
 
     @lazy
     def _poses(self) -> Poses:
@@ -171,6 +179,7 @@ def reactions(
     external: Mapping[str, Array],
 ) -> Reactions:
     """Compute all reactions; see `Reactions`."""
+    own, chain = len(chain.closures), at_rest(chain)
     found = _by_factors(chain, trajectory, torque, external)
     regular = found is not None
     if found is None:
@@ -179,7 +188,9 @@ def reactions(
         found = _by_decomposition(chain, trajectory, unbalanced, external)
     multipliers, vanishing, wrench, mismatch = found
     require_finite("reactions", {"multipliers": multipliers, "wrench": wrench, "mismatch": mismatch})
-    return Reactions(chain, trajectory, external, multipliers, vanishing, wrench, mismatch, regular)
+    for k, j in carried_by_rests(chain):
+        wrench[:, j - 1] += wrench[:, chain.model.njoints - 1 + k]
+    return Reactions(chain, trajectory, external, multipliers, vanishing, wrench, mismatch, regular, own)
 
 
 _Found = tuple[Array, Array, Array, float]  # multipliers, vanishing, wrench, mismatch
@@ -205,7 +216,7 @@ def _by_decomposition(chain: ClosedChain, path: Trajectory, unbalanced: Array, e
     tree = loops.tree
     poses = tree.poses(path.q)
     seen = loops.see(path.q)
-    decomposed = Decomposed.of(loops.scaled(seen.J))
+    decomposed = Decomposed.of(loops.scaled(seen.J), loops.misfit)
     ranks = decomposed.ranks
     multipliers = decomposed.carry(unbalanced * loops.column_scale, ranks) * loops.row_scale
     moving = body_rates(tree, Bodies.of(chain), poses, tree.rates(path.q, path.v), path.a)

@@ -19,6 +19,7 @@ from fivebar_pin.dynamics.mass import depth_first, mass_matrix
 from fivebar_pin.dynamics.motor_equations import motor_equations
 from fivebar_pin.mechanism.complement import rates_of, require_regular
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.trajectory import Trajectory
 
@@ -44,6 +45,7 @@ def reduced_dynamics(chain: ClosedChain, q: npt.ArrayLike, v_actuated: npt.Array
         SingularityError: the actuated joints do not determine the motion at q.
         InvalidInputError: wrong shapes, or q not closed.
     """
+    chain = at_rest(chain)
     loops, Q = loops_of(chain), numeric("q", q)
     loops.require_determined()
     single = Q.ndim == 1

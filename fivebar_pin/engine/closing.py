@@ -16,8 +16,10 @@ from fivebar_pin.engine.compiled import compiled
 from fivebar_pin.engine.rows import jacobian, look
 from fivebar_pin.engine.tables import (
     CLOSED,
+    CORRECTION,
     GOING,
     LEAD,
+    MISFIT,
     MOVED,
     NV,
     RESIDUAL,
@@ -43,10 +45,12 @@ _ASTRAY = 1.0  # largest step of a coordinate that is a correction [rad, or chai
 def close(I: Integers, W: Array) -> None:
     """Close q by its passive coordinates and set the flag `CLOSED`; `MOVED` gathers what they move by.
 
-    What the closures are there, and the factors of their passive columns, stand in W.
+    What the closures are there, and the factors of their passive columns, stand in W. Rows of rounded dimensions that
+    contradict each other are met in the sense of least squares, up to the misfit of the chain: there it is the
+    correction that tells the end.
     """
     last, steps = False, 0
-    W[I[GOING]] = 1.0
+    W[I[GOING]], W[I[CORRECTION]] = 1.0, inf
     while W[I[GOING]] == 1.0:
         place(I, W)
         look(I, W)
@@ -55,7 +59,8 @@ def close(I: Integers, W: Array) -> None:
         closed = regular and (last or error <= ROUND_OFF)
         W[I[CLOSED]] = 1.0 if closed else 0.0
         W[I[GOING]] = 1.0 if regular and not closed and error < inf and steps < _MOST else 0.0
-        last, steps = error < _POLISHED, steps + 1
+        settled = error <= W[I[MISFIT]] and W[I[CORRECTION]] < _POLISHED
+        last, steps = error < _POLISHED or settled, steps + 1
         if W[I[GOING]] == 1.0:
             _step(I, W)
 
@@ -77,10 +82,12 @@ def _step(I: Integers, W: Array) -> None:
     for k in range(I[NV]):
         W[I[X] + k] = 0.0
     solve(I, W)
+    W[I[CORRECTION]] = 0.0
     for k in range(I[NV]):
         step = W[I[X] + k]
         if not abs(step) <= _ASTRAY * W[I[SCALE] + k]:
             W[I[GOING]] = 0.0
+        W[I[CORRECTION]] = max(W[I[CORRECTION]], abs(step) / W[I[SCALE] + k])
         W[I[MOVED] + k] += step
     if W[I[GOING]] == 1.0:
         integrate(I, W, I[X])

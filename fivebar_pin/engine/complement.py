@@ -25,6 +25,7 @@ from fivebar_pin.engine.tables import (
     JACOBIAN0,
     LEAD,
     LOCAL,
+    MISFIT,
     MIX,
     MOTOR_COUNT,
     MOTOR_LIST,
@@ -54,6 +55,7 @@ from fivebar_pin.engine.tree import drift, move
 
 __all__ = ["accelerations", "complement", "velocities"]
 
+_ROUNDED = 10.0  # the same, in misfits [-]
 _TIED = 1e-7  # rate of closures at unit speed of a motor from which on they tie it to others [-]
 
 
@@ -70,7 +72,7 @@ def complement(I: Integers, W: Array) -> None:
             for k in range(n):
                 W[I[N_HERE] + I[columns + k] * na + a] = W[I[RHS] + k]
             for k in range(n, I[g + HEIGHT]):
-                if not abs(W[I[RHS] + k]) * W[I[SCALE] + I[I[MOTORS] + a]] <= _TIED:
+                if not abs(W[I[RHS] + k]) * W[I[SCALE] + I[I[MOTORS] + a]] <= max(_TIED, _ROUNDED * W[I[MISFIT]]):
                     W[I[STATUS]] = TOGETHER
 
 

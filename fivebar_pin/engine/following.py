@@ -69,7 +69,6 @@ from fivebar_pin.engine.tables import (
     POINT,
     Q_BEFORE,
     Q_HERE,
-    RATIOS,
     RAW,
     REACH,
     ROW0,
@@ -79,6 +78,7 @@ from fivebar_pin.engine.tables import (
     SIGNS,
     SIGNS_BEFORE,
     SORT,
+    SPIN,
     STATUS,
     TARGET,
     TO,
@@ -273,10 +273,10 @@ def _travel_and_arm(I: Integers, W: Array, r: int) -> tuple[float, float]:
 
     An arm counts as one at least, and is longer by the lead of a joint that slides as it turns. A rod of length ρ
     turns by 1 / ρ for a unit of travel of its ends, which makes its derivatives larger. Each closure counts once, with
-    its first row; one that ties coordinates is straight.
+    its first row; those of coordinates, and of velocities alone, are straight.
     """
     point, square, travel = vector_at(W, I[r + WRENCH] + POINT), 0.0, 0.0
-    curved = r == I[I[r + CLOSURE] + ROW0] and I[r + SORT] != RATIOS
+    curved = r == I[I[r + CLOSURE] + ROW0] and I[r + SORT] < SPIN
     for e in range(I[r + ENTRIES], I[r + ENTRIES_END] if curved else I[r + ENTRIES], ENTRY_SIZE):
         travel += abs(W[I[MOVED] + I[e + COLUMN]]) / W[I[SCALE] + I[e + COLUMN]]
         arm = sub(point, vector_at(W, I[e + ENTRY_CENTRE]))

@@ -169,7 +169,7 @@ def _hold(I: Integers, W: Array, c: int) -> None:
     force, moment, point = _NOTHING, _NOTHING, _NOTHING
     for r in range(I[c + ROW0], I[c + ROW0_END], ROW_SIZE):
         k, lead = I[r + WRENCH], W[I[r + LEAD]]
-        if I[c + TIES] == 1:
+        if I[c + TIES] > 0:
             j = I[r + JACOBIAN0]
             for e in range(I[c + ENTRY0], I[c + ENTRY0_END], ENTRY_SIZE):
                 W[I[JOINT] + I[e + COLUMN]] -= W[j] * lead

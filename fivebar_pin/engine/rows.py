@@ -61,6 +61,7 @@ from fivebar_pin.engine.tables import (
     SHIFT,
     SIGN,
     SORT,
+    SPIN,
     TIES,
     TILT,
     TURN,
@@ -121,6 +122,8 @@ def look(I: Integers, W: Array) -> None:
     for c in range(I[CLOSURES], I[CLOSURES_END], CLOSURE_SIZE):
         if I[c + TIES] == 1:
             _tie(I, W, c)
+        elif I[c + TIES] == 2:
+            W[I[I[c + ROW0] + RESIDUAL]] = 0.0
         else:
             pose1, pose2, frame = I[c + POSE1], I[c + POSE2], I[c + FRAMES]
             P2 = point_of(W, pose2, frame + SECOND_FRAME)
@@ -155,6 +158,8 @@ def _row(W: Array, sort: int, k: int, pose1: int, pose2: int, frame: int, d: Vec
     elif sort == TURNED:
         phi = rotation_vector(axes_of(W, pose1, frame), axes_of(W, pose2, frame + SECOND_FRAME))
         gap, f, m = dot(b, phi), zero, turning_moment(phi, b)
+    elif sort == SPIN:
+        gap, f, m = W[k + OFFSET], zero, _turned(W, pose2, frame + SECOND_FRAME, vector_at(W, k + OTHER))
     else:
         gap = length_of(d)
         f, m = scaled(1.0 / gap, d) if gap > 0.0 else _turned(W, pose1, frame, (1.0, 0.0, 0.0)), zero
@@ -170,7 +175,7 @@ def jacobian(I: Integers, W: Array) -> None:
     """
     for c in range(I[CLOSURES], I[CLOSURES_END], CLOSURE_SIZE):
         k = 0
-        if I[c + TIES] == 1:
+        if I[c + TIES] > 0:
             for e in range(I[c + ENTRY0], I[c + ENTRY0_END], ENTRY_SIZE):
                 r = I[c + ROW0]
                 W[I[r + JACOBIAN0] + k] = W[I[r + DIRECTION] + UNIT] * W[I[e + RATIO]]
@@ -205,7 +210,7 @@ def drifts(I: Integers, W: Array) -> None:
     everywhere.
     """
     for c in range(I[CLOSURES], I[CLOSURES_END], CLOSURE_SIZE):
-        if I[c + TIES] == 1:
+        if I[c + TIES] > 0:
             W[I[I[c + ROW0] + LEAD]] = 0.0
         else:
             _drifts(I, W, c)
@@ -230,6 +235,8 @@ def _drifts(I: Integers, W: Array, c: int) -> None:
         k, sort = I[r + DIRECTION], I[r + SORT]
         if sort == ALONG:
             drift = dot(vector_at(W, I[r + WRENCH] + FORCE), point)
+        elif sort == SPIN:
+            drift = dot(vector_at(W, I[r + WRENCH] + MOMENT), alpha)
         elif sort == LENGTH:
             drift = W[k + UNIT] * _lengthening(d, d_rate, d_rate2)
         else:

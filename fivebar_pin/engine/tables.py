@@ -32,12 +32,12 @@ NQ, NV, NA, CONSTANTS, MEMORY = range(5)
 ) = range(5, 18)  # fmt: skip
 # Places in W: of constants, of the sample at hand, of the points of the branch before it.
 (
-    GRAVITY, SCALE, LOSSES, Q_HERE, V_HERE, A_HERE, X, MOVED, TARGET, JOINT, TAU, SHAKING, CARRIED, RHS, RAW_RHS,
-    RESIDUALS, J_HERE, N_HERE, N_LAST, N_SECOND, Q_BEFORE, J_BEFORE, SIGNS, SIGNS_BEFORE, NORMS, NORMS_BEFORE, REACH,
-    LAST_STEP, SECOND_STEP, POSES, RATES, LOADS, JACOBIAN, CLOSED, GOING, STATUS, TO, TO_V, TO_A,
-    M_BAR,
-) = range(18, 58)  # fmt: skip
-HEADER = 58
+    GRAVITY, SCALE, LOSSES, MISFIT, Q_HERE, V_HERE, A_HERE, X, MOVED, TARGET, JOINT, TAU, SHAKING, CARRIED, RHS,
+    RAW_RHS, RESIDUALS, J_HERE, N_HERE, N_LAST, N_SECOND, Q_BEFORE, J_BEFORE, SIGNS, SIGNS_BEFORE, NORMS, NORMS_BEFORE,
+    REACH, LAST_STEP, SECOND_STEP, POSES, RATES, LOADS, JACOBIAN, CLOSED, GOING, STATUS, TO, TO_V, TO_A,
+    M_BAR, CORRECTION,
+) = range(18, 60)  # fmt: skip
+HEADER = 60
 
 # Fields of a link.
 (
@@ -54,7 +54,8 @@ AXIS, WAY, CENTRE, MOTION, PITCH, OWNER, QS, QS_KIND = range(8)
 COLUMN_SIZE = 8
 TURN, SHIFT, HELIX = range(3)
 
-# Fields of a closure and of its entries, the columns that move it.
+# Fields of a closure and of its entries, the columns that move it. TIES: 0 between frames, 1 of coordinates, 2 of
+# their velocities alone.
 POSE1, POSE2, RATE1, RATE2, FRAMES, ROW0, ROW0_END, ENTRY0, ENTRY0_END, TIES = range(10)
 CLOSURE_SIZE = 10
 COLUMN, SIGN, LOCAL, ENTRY_AXIS, ENTRY_WAY, ENTRY_CENTRE, ENTRY_MOTION, ENTRY_PITCH, RATIO = range(9)
@@ -63,7 +64,7 @@ ENTRY_SIZE = 9  # LOCAL: place in its block, or -1
 # Fields of a row.
 SORT, DIRECTION, RESIDUAL, LEAD, WRENCH, JACOBIAN0, ENTRIES, ENTRIES_END, CLOSURE = range(9)
 ROW_SIZE = 9
-ALONG, TILT, TURNED, LENGTH, RATIOS = range(5)
+ALONG, TILT, TURNED, LENGTH, SPIN, RATIOS = range(6)
 
 # Fields of a block: its rows (places of their records), its columns (velocity coordinates), its motors; RAW rows are
 # mixed to HEIGHT ones where MIX is a place.

@@ -1,4 +1,4 @@
-"""Mechanisms from files and to files: URDF with a sidecar, MJCF, and the ones that ship.
+"""Mechanisms from files and to files: URDF and SDF with a sidecar, MJCF, and the ones that ship.
 
 `fivebar_pin.shipped` holds the functions that make the shipped mechanisms, and the legs of the Solo robot.
 """

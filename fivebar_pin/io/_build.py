@@ -15,9 +15,10 @@ from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._entries import UNLIMITED, JointEntry, TreeEntry
 from fivebar_pin.io._sidecar import DATA_FIELDS, UNIVERSAL, Sidecar
 
-__all__ = ["bare_inertia", "build_model", "joint_model", "joint_order", "set_default_limits"]
+__all__ = ["bare_inertia", "build_model", "joint_model", "joint_order", "set_default_limits", "stated_inertia"]
 
 ROOT_JOINT = "root_joint"
+_NO_MOMENT = 1e-9  # moment of inertia up to which a link that has no mass is taken to have none [kg m2]
 _NOT_NEGATIVE = ("armature", "damping", "effort", "friction", "rotor_inertia", "velocity")
 _AXES = {(1.0, 0.0, 0.0): 0, (0.0, 1.0, 0.0): 1, (0.0, 0.0, 1.0): 2}
 _ALIGNED = {
@@ -71,7 +72,7 @@ def _with_types(tree: TreeEntry, types: Mapping[str, str], beside: Path) -> Tree
     joints = dict(tree.joints)
     for name, word in types.items():
         if name not in joints:
-            raise FileFormatError(beside, "joint_name: " + str(UnknownNameError("joint", name, joints)))
+            continue  # whoever reads the sidecar tells of it
         joint = joints[name]
         if word == "FIXED":
             joints[name] = replace(joint, kind="fixed", data={})
@@ -97,7 +98,7 @@ def _universal(joint: JointEntry, axes: str, tree: TreeEntry, beside: Path) -> d
     one, two = (np.eye(3)["XYZ".index(letter)] for letter in axes)
     data = {"lower": [-UNLIMITED], "upper": [UNLIMITED]}
     return {
-        first: replace(joint, name=first, kind="revolute", child=cross, axis=one, data=data),
+        first: replace(joint, name=first, kind="revolute", child=cross, axis=one, data=data, offset=np.eye(4)),
         second: replace(joint, name=second, kind="revolute", parent=cross, placement=np.eye(4), axis=two, data=data),
     }
 
@@ -111,13 +112,14 @@ class _Builder:
         self.pin.name = tree.name
         self.inertias: dict[int, list[tuple[Array, pin.Inertia]]] = {}
         self.link: dict[str, tuple[int, Array, int]] = {}
-        base = 0
+        base, placement = 0, tree.placement
         if free_flyer:
             if ROOT_JOINT in tree.joints:
                 raise FileFormatError(urdf, f"has a joint {ROOT_JOINT!r} already; a free-flying base needs that name")
-            base = self.pin.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT_JOINT)
+            base = self.pin.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3(placement), ROOT_JOINT)
             self.pin.addJointFrame(base, 0)
-        self.body(tree.root, base, np.eye(4), self.pin.nframes - 1)
+            placement = np.eye(4)
+        self.body(tree.root, base, placement, self.pin.nframes - 1)
 
     def model(self, sidecar: Sidecar, beside: Path) -> pin.Model:
         for name in self.order(sidecar, beside):
@@ -150,21 +152,17 @@ class _Builder:
 
     def joint(self, joint: JointEntry) -> None:
         parent, M, frame = self.link[joint.parent]
-        placement = M @ joint.placement if not np.array_equal(M, np.eye(4)) else joint.placement
+        placement = _moved(M, joint.placement)
         if joint.kind == "fixed":
             fixed = pin.Frame(joint.name, parent, frame, pin.SE3(placement), pin.FrameType.FIXED_JOINT)
-            self.body(joint.child, parent, placement, self.pin.addFrame(fixed))
+            self.body(joint.child, parent, _moved(placement, joint.offset), self.pin.addFrame(fixed))
             return
-        inertia = self.tree.links[joint.child].inertia
-        if inertia is not None and inertia.mass == 0.0:
-            problem = f"link {joint.child!r}: mass = 0 on a moving link; give it a mass, or leave <inertial> out"
-            raise FileFormatError(self.urdf, problem + " if it is meant to be massless")
         j = self.pin.addJoint(parent, joint_model(joint.kind, joint.axis), pin.SE3(placement), joint.name)
         self.pin.addJointFrame(j, frame)
         set_default_limits(self.pin, j, joint.kind)
         for word, values in joint.data.items():
             _set_entry(self.pin, j, word, np.array(values))
-        self.body(joint.child, j, np.eye(4), self.pin.nframes - 1)
+        self.body(joint.child, j, joint.offset, self.pin.nframes - 1)
 
     def body(self, link: str, joint: int, placement: Array, frame: int) -> None:
         self.pin.addBodyFrame(link, joint, pin.SE3(placement), frame)
@@ -172,6 +170,11 @@ class _Builder:
         inertia = self.tree.links[link].inertia
         if inertia is not None:
             self.inertias.setdefault(joint, []).append((placement, inertia))
+
+
+def _moved(M: Array, placement: Array) -> Array:
+    """Return the product of two poses, to the last digit where the first is none."""
+    return placement if np.array_equal(M, np.eye(4)) else M @ placement
 
 
 def _with_fixed(tree: TreeEntry, wanted: list[str], beside: Path) -> list[str]:
@@ -199,6 +202,15 @@ def bare_inertia(mass: float, com: Array, tensor: Array) -> pin.Inertia:
     result = pin.Inertia.Zero()
     result.mass, result.lever, result.inertia = mass, com, tensor
     return result
+
+
+def stated_inertia(mass: float, com: Array, tensor: Array) -> pin.Inertia | None:
+    """Return the inertia that a file states of a link, None for one without mass or moments worth the name.
+
+    Moments without mass are kept as they are: the diagnosis tells that no body has them.
+    """
+    massless = mass == 0.0 and np.abs(tensor).max() <= _NO_MOMENT
+    return None if massless else bare_inertia(mass, com, tensor)
 
 
 def joint_model(kind: str, axis: Array) -> object:

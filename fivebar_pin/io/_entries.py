@@ -38,6 +38,7 @@ class JointEntry:
         axis: unit axis in the joint's own axes (3,).
         data: limits and losses by name, each a list per coordinate or degree of freedom.
         mimic: the coupling by which the file ties it to another joint, or None.
+        offset: pose of the child link in the moved axes of the joint, homogeneous (4, 4).
     """
 
     name: str
@@ -48,16 +49,18 @@ class JointEntry:
     axis: Array
     data: dict[str, list[float]] = field(default_factory=dict)
     mimic: Coupling | None = None
+    offset: Array = field(default_factory=lambda: np.eye(4))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TreeEntry:
-    """A tree of links and joints with exactly one root."""
+    """A tree of links and joints with exactly one root, whose pose in the world is `placement` (4, 4)."""
 
     name: str
     root: str
     links: dict[str, LinkEntry]
     joints: dict[str, JointEntry]
+    placement: Array = field(default_factory=lambda: np.eye(4))
 
 
 def rpy_to_matrix(rpy: list[float]) -> Array:

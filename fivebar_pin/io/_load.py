@@ -1,8 +1,7 @@
-"""Loading a mechanism from files: a URDF with its sidecar, or an MJCF file."""
+"""Loading a mechanism from files: a tree (URDF, SDF) with its sidecar, or an MJCF file."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -11,22 +10,22 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from fivebar_pin._arrays import checked
-from fivebar_pin._files import MAX_BYTES, as_path, read_bounded
+from fivebar_pin._files import MAX_BYTES, as_path
 from fivebar_pin.chain import ClosedChain, Geometry, Visual, frames_by_name
 from fivebar_pin.chain.spring_checks import checked_springs
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError, UnknownNameError
 from fivebar_pin.io._build import build_model
 from fivebar_pin.io._entries import UNLIMITED, TreeEntry
-from fivebar_pin.io._mjcf_include import mechanism_files
-from fivebar_pin.io._shipped import shipped, shipped_path
-from fivebar_pin.io._sidecar import MAX_SIDECAR_BYTES, Sidecar, read_sidecar
-from fivebar_pin.io._urdf import read_urdf
+from fivebar_pin.io._find import mechanism_file, named, sidecar_file, stem
+from fivebar_pin.io._left_out import left_out
+from fivebar_pin.io._meshes import unreadable
+from fivebar_pin.io._sidecar import Sidecar, read_sidecar
+from fivebar_pin.io._stated import Stated
+from fivebar_pin.io._tree_file import read_tree
 from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["load"]
-
-_LINKAGE = re.compile(rb"^linkage\s*:", re.MULTILINE)
 
 
 def load(
@@ -41,28 +40,29 @@ def load(
     """Load a closed chain.
 
     Args:
-        path: a folder with one URDF (and its sidecar) or one MJCF mechanism beside its scenes; a .urdf file whose
-            sidecar lies beside it under the same name (.yaml or .yml), or as the folder's only sidecar; an MJCF .xml
-            file; or the name of a mechanism that ships (`shipped`), where no file or folder is called so.
-        free_flyer: put the root of a URDF on a free-flying base.
+        path: a folder with one URDF (and its sidecar) or one file of another format, MJCF scenes that include it left
+            aside; a .urdf, .sdf, .world or .xacro file whose sidecar lies beside it under the same name (.yaml or
+            .yml), or as the folder's only sidecar; an MJCF .xml file; or the name of a mechanism that ships
+            (`shipped`), where no file or folder is called so. A file that closes its loops itself needs no sidecar.
+        free_flyer: put the root of a URDF or SDF on a free-flying base.
         closures: use these instead of the file's closures, among them the couplings that <mimic> states in a URDF;
             with `actuated`, no sidecar is needed.
         actuated: drive these joints instead of the file's.
         gravity: use this (3,) [m/s2] instead of the file's.
-        max_bytes: size above which a URDF or MJCF file is not read.
+        max_bytes: size above which a file is not read.
 
     Returns:
         The chain; meshes are named in its visuals, and read where an MJCF file takes a mass from them.
 
     Warns:
-        LeftOutWarning: the file states things that the chain goes without; names them in one line.
+        LeftOutWarning: what a file states and the mechanism goes without, in one line.
 
     Raises:
         FileFormatError: a file is missing, malformed or states something impossible; names file, element, way out.
         InvalidInputError, UnknownNameError: an argument of this call is wrong, or no file and no mechanism that ships
             has this name.
     """
-    where = _named(as_path(path))
+    where = named(as_path(path))
     file = mechanism_file(where)
     given_closures = None if closures is None else _closures(closures)
     given_actuated = None if actuated is None else _names(actuated)
@@ -71,11 +71,11 @@ def load(
 
         if free_flyer:
             raise InvalidInputError(
-                "free_flyer", free_flyer, "is for URDF files; an MJCF file states <freejoint/> itself"
+                "free_flyer", free_flyer, "is for URDF and SDF files; an MJCF file states <freejoint/> itself"
             )
         chain = read_mjcf(file, closures=given_closures, actuated=given_actuated, max_bytes=max_bytes)
     else:
-        chain = _load_urdf(file, free_flyer, given_closures, given_actuated, max_bytes)
+        chain = _load_tree(file, free_flyer, given_closures, given_actuated, max_bytes)
     return chain if gravity is None else chain.with_gravity(checked("gravity", gravity, (3,)))
 
 
@@ -95,117 +95,58 @@ def _names(actuated: Iterable[str]) -> tuple[str, ...]:
     return names
 
 
-def _named(path: Path) -> Path:
-    """Return the path, or the mechanism that ships under a bare name that is no file."""
-    try:
-        if path.name != str(path) or path.suffix or path.exists():
-            return path
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be looked at ({error.strerror or error})") from error
-    if path.name not in shipped():
-        raise UnknownNameError("file, folder or shipped mechanism", path.name, shipped())
-    return shipped_path(path.name)
-
-
-def mechanism_file(path: Path) -> Path:
-    """Return the URDF or MJCF file that `path` means."""
-    try:
-        is_folder, exists = path.is_dir(), path.exists()
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be looked at ({error.strerror or error})") from error
-    if not exists:
-        raise FileFormatError(path, "there is no such file or folder")
-    if not is_folder:
-        if is_linkage_file(path):
-            raise FileFormatError(path, "is a linkage file, not a tree: its points close its loops; `fb.load` reads it")
-        if path.suffix.lower() in (".yaml", ".yml"):
-            rule = "is no linkage file, which states linkage: NAME, and a sidecar is read with its tree: name the .urdf"
-            raise FileFormatError(path, rule)
-        if path.suffix.lower() not in (".urdf", ".xml"):
-            raise FileFormatError(path, "has an unknown ending; expected a .urdf or MJCF .xml file, or a folder")
-        return path
-    for ending in (".urdf", ".xml"):
-        found = _in_folder(path, (ending,))
-        named = [f for f in found if f.stem in ("robot", path.name)]
-        if len(found) > 1 and ending == ".xml" and not named:
-            found = mechanism_files(found)
-        if len(found) == 1 or len(named) == 1:
-            return (named or found)[0]
-        if found:
-            names = ", ".join(f.name for f in found[:8])
-            raise FileFormatError(path, f"holds {len(found)} {ending} files ({names}); name the one to load")
-    raise FileFormatError(path, "holds no .urdf and no MJCF .xml file")
-
-
-def _in_folder(folder: Path, endings: tuple[str, ...]) -> list[Path]:
-    try:
-        return sorted(f for f in folder.iterdir() if f.suffix.lower() in endings and f.is_file())
-    except OSError as error:
-        raise FileFormatError(folder, f"cannot be listed ({error.strerror or error})") from error
-
-
-def is_linkage_file(path: Path) -> bool:
-    """Tell whether a file is a linkage, see `fivebar_pin.planar`: YAML with the key `linkage`, which no sidecar has."""
-    if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
-        return False
-    try:
-        return _LINKAGE.search(read_bounded(path, MAX_SIDECAR_BYTES)) is not None
-    except FileFormatError:
-        return False  # whoever reads it says why it cannot be read
-
-
-def sidecar_file(urdf: Path) -> Path | None:
-    """Return the sidecar that is read with a URDF: of the same name, or the only one of a folder with one URDF.
-
-    Linkage files are YAML too, and no sidecars.
-    """
-    beside = [file for file in _in_folder(urdf.parent, (".yaml", ".yml")) if not is_linkage_file(file)]
-    same = [f for f in beside if f.stem == urdf.stem]
-    if len(same) > 1:
-        raise FileFormatError(urdf, f"has two sidecars ({', '.join(f.name for f in same)}); keep one")
-    if same:
-        return same[0]
-    alone = len(beside) == 1 and len(_in_folder(urdf.parent, (".urdf",))) == 1
-    return beside[0] if alone else None
-
-
-def _load_urdf(
-    urdf: Path,
+def _load_tree(
+    file: Path,
     free_flyer: bool,
     closures: tuple[Closure, ...] | None,
     actuated: tuple[str, ...] | None,
     max_bytes: int,
 ) -> ClosedChain:
-    tree = read_urdf(urdf, max_bytes=max_bytes)
-    beside = sidecar_file(urdf)
-    if beside is None and (closures is None or actuated is None):
+    """Load a tree and what its sidecar says of it."""
+    beside = sidecar_file(file)
+    stated = read_tree(file, named_loops=beside is None and closures is None, max_bytes=max_bytes)
+    closes = beside is not None or bool(stated.closures)
+    if not (closes or closures is not None) or not (closes or actuated is not None or stated.motors):
         raise FileFormatError(
-            urdf,
-            f"has no sidecar: put {urdf.stem}.yaml beside it with closed_loop, type and name_mot, or pass closures=... "
-            "and actuated=... (closures=() for an open tree); `fivebar-pin close` proposes one",
+            file,
+            f"has no sidecar: put {stem(file)}.yaml beside it with closed_loop, type and name_mot, or pass "
+            "closures=... and actuated=... (closures=() for an open tree); `fivebar-pin close` proposes one",
         )
-    sidecar = Sidecar() if beside is None else read_sidecar(beside)
-    note = beside or urdf
-    stated = (*sidecar.closures, *_mimics(tree, sidecar))
-    tree = _counting(tree, stated if closures is None else closures)
-    model = build_model(tree, sidecar, free_flyer=free_flyer, urdf=urdf, beside=note)
+    sidecar = Sidecar(actuated=stated.motors) if beside is None else read_sidecar(beside)
+    note = beside or file
+    loops, mimics = _loops(stated, sidecar), _mimics(stated.tree, sidecar)
+    used = (*sidecar.closures, *loops, *mimics) if closures is None else closures
+    tree = _counting(stated.tree, used)
+    sidecar = replace(sidecar, gravity=sidecar.gravity or stated.gravity)
+    model = build_model(tree, sidecar, free_flyer=free_flyer, urdf=file, beside=note)
     if closures is None:
         check_file_closures(model, sidecar.closures, note, "closed_loop")
-        check_file_closures(model, stated[len(sidecar.closures) :], urdf, "mimic")
+        check_file_closures(model, loops, file, "loop")
+        check_file_closures(model, mimics, file, "mimic")
     if actuated is None:
         check_file_actuated(model, tree, sidecar, note)
     check_springs(model, sidecar.springs, note)
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
-    return make_chain(
+    chain = make_chain(
         model,
-        stated if closures is None else closures,
+        used,
         sidecar.actuated if actuated is None else actuated,
         visuals,
-        urdf,
+        file,
         argument=closures is not None or actuated is not None,
-        springs=sidecar.springs,
+        springs=(*stated.springs, *sidecar.springs),
         geometry=sidecar.geometry,
     )
+    left_out(file, (*stated.left_out, *unreadable(visuals)))
+    absent = [name for name in sidecar.joint_types if name not in tree.joints]
+    left_out(note, [f"joint_type of joint {name!r}, which the tree does not have" for name in absent])
+    return chain
+
+
+def _loops(stated: Stated, sidecar: Sidecar) -> tuple[Closure, ...]:
+    """Return the loops that the file closes itself, without those that the sidecar closes at the same frames."""
+    held = [set(closure.joins) for closure in sidecar.closures]
+    return tuple(closure for closure in stated.closures if set(closure.joins) not in held)
 
 
 def _mimics(tree: TreeEntry, sidecar: Sidecar) -> tuple[Closure, ...]:
@@ -215,11 +156,13 @@ def _mimics(tree: TreeEntry, sidecar: Sidecar) -> tuple[Closure, ...]:
     return tuple(j.mimic for j in moving if j.mimic is not None)
 
 
-def stated_couplings(urdf: Path, *, max_bytes: int = MAX_BYTES) -> tuple[tuple[Closure, ...], tuple[Closure, ...]]:
-    """Return the couplings of joints that a URDF states as <mimic>, and those of the sidecar beside it."""
-    beside = sidecar_file(urdf)
+def stated_closures(file: Path, *, max_bytes: int = MAX_BYTES) -> tuple[tuple[Closure, ...], tuple[Closure, ...]]:
+    """Return what a tree closes itself: loops and the couplings of <mimic>; and the couplings of its sidecar."""
+    beside = sidecar_file(file)
     sidecar = Sidecar() if beside is None else read_sidecar(beside)
-    return _mimics(read_urdf(urdf, max_bytes=max_bytes), sidecar), tuple(c for c in sidecar.closures if c.counted)
+    stated = read_tree(file, max_bytes=max_bytes)
+    own = (*_loops(stated, sidecar), *_mimics(stated.tree, sidecar))
+    return own, tuple(c for c in sidecar.closures if c.counted)
 
 
 def _counting(tree: TreeEntry, closures: tuple[Closure, ...]) -> TreeEntry:

@@ -1,4 +1,4 @@
-"""The sidecar beside a URDF: which frames close loops, which joints are driven, and what URDF cannot say.
+"""The sidecar beside a URDF or SDF: which frames close loops, which joints are driven, and what URDF cannot say.
 
 Keys that example-parallel-robots uses: ``closed_loop``, ``type``, ``name_mot``, ``joint_name``, ``joint_type``.
 Ours, written only when needed: ``closure_name`` and what the kinds of closure state of themselves (``axis``,

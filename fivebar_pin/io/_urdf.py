@@ -9,36 +9,38 @@ import numpy as np
 import pinocchio as pin
 
 from fivebar_pin._arrays import Array
-from fivebar_pin._files import MAX_BYTES
-from fivebar_pin.chain import Visual
 from fivebar_pin.closures import Coupling
-from fivebar_pin.errors import FileFormatError, InvalidInputError, UnknownNameError
-from fivebar_pin.io._build import bare_inertia
-from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry, rpy_to_matrix
-from fivebar_pin.io._xml import UNIT, Reader, direction, parse_xml
+from fivebar_pin.errors import FileFormatError, UnknownNameError
+from fivebar_pin.io._build import stated_inertia
+from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry
+from fivebar_pin.io._loops import close, closing_pairs
+from fivebar_pin.io._stated import Stated
+from fivebar_pin.io._urdf_besides import IN_JOINT, IN_LINK, read_loops, read_motors, read_springs, unread
+from fivebar_pin.io._urdf_pose import pose
+from fivebar_pin.io._urdf_visual import Colours, read_colours, read_visual
+from fivebar_pin.io._xml import UNIT, Reader, direction
 
 __all__ = ["read_urdf"]
 
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-_IN_ROBOT = ("link", "joint", "material", "gazebo", "transmission")
-_IN_LINK = ("inertial", "visual", "collision", "collision_checking", "self_collision_checking", "contact")
-_IN_JOINT = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
+_IN_ROBOT = ("link", "joint", "material", "gazebo", "transmission", "ros2_control", "loop_joint", "constraint")
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_SHAPES = ("box", "capsule", "cylinder", "sphere", "mesh")
-_GREY = (0.6, 0.6, 0.65, 1.0)
-Colours = dict[str, tuple[float, float, float, float]]
 
 
-def read_urdf(path: Path, *, max_bytes: int = MAX_BYTES) -> TreeEntry:
-    """Return the tree that a URDF file describes.
+def read_urdf(path: Path, robot: ElementTree.Element, *, named_loops: bool = False) -> Stated:
+    """Return what a URDF file states.
+
+    Args:
+        path: the file.
+        robot: its root element.
+        named_loops: close loops that are stated only by frames called closing_NAME_1 and closing_NAME_2.
 
     Raises:
         FileFormatError: anything that is not a tree of known joints with finite numbers; names file and element.
     """
-    robot = parse_xml(path, root="robot", max_bytes=max_bytes)
     reader = Reader(path)
     reader.no_misspelt(robot, "<robot>", tags=_IN_ROBOT)
-    colours = _colours(reader, robot)
+    colours = read_colours(reader, robot)
     links: dict[str, LinkEntry] = {}
     for element in robot.findall("link"):
         link = _link(reader, element, colours)
@@ -57,7 +59,11 @@ def read_urdf(path: Path, *, max_bytes: int = MAX_BYTES) -> TreeEntry:
         if name == UNIVERSE:
             raise reader.fail(f"{name!r}", "is the name of the fixed world in Pinocchio; rename the link or joint")
     root = _root(reader, links, joints)
-    return TreeEntry(robot.get("name") or path.stem, root, links, joints)
+    tree = TreeEntry(robot.get("name") or path.stem, root, links, joints)
+    loops = read_loops(reader, robot, tree)
+    found, closures = close(reader, tree, loops + (closing_pairs(tree) if named_loops else []))
+    springs = read_springs(reader, robot, tree)
+    return Stated(found, closures, read_motors(robot, tree), springs, left_out=unread(robot))
 
 
 def _root(reader: Reader, links: dict[str, LinkEntry], joints: dict[str, JointEntry]) -> str:
@@ -92,32 +98,19 @@ def _root(reader: Reader, links: dict[str, LinkEntry], joints: dict[str, JointEn
     return roots[0]
 
 
-def _origin(reader: Reader, parent: ElementTree.Element, where: str) -> tuple[Array, Array]:
-    element = reader.only(parent, "origin", where)
-    reader.known(element, ("xyz", "rpy"), where)
-    xyz = reader.numbers(element, "xyz", 3, where, [0.0, 0.0, 0.0])
-    rpy = reader.numbers(element, "rpy", 3, where, [0.0, 0.0, 0.0])
-    return np.array(xyz), rpy_to_matrix(rpy)
-
-
-def _homogeneous(xyz: Array, R: Array) -> Array:
-    M = np.eye(4)
-    M[:3, :3], M[:3, 3] = R, xyz
-    return M
-
-
 def _link(reader: Reader, element: ElementTree.Element, colours: Colours) -> LinkEntry:
     name = reader.text(element, "name", "a <link>")
     where = f"link {name!r}"
-    reader.no_misspelt(element, where, tags=_IN_LINK)
+    reader.no_misspelt(element, where, tags=IN_LINK)
     inertial = reader.only(element, "inertial", where)
-    visuals = tuple(_visual(reader, visual, name, colours) for visual in element.findall("visual"))
+    visuals = tuple(read_visual(reader, visual, name, colours) for visual in element.findall("visual"))
     return LinkEntry(name, None if inertial is None else _inertia(reader, inertial, where), visuals)
 
 
-def _inertia(reader: Reader, inertial: ElementTree.Element, where: str) -> pin.Inertia:
+def _inertia(reader: Reader, inertial: ElementTree.Element, where: str) -> pin.Inertia | None:
     reader.no_misspelt(inertial, where, tags=("origin", "mass", "inertia"))
-    com, R = _origin(reader, inertial, where)
+    M = pose(reader, inertial, where)
+    com, R = M[:3, 3], M[:3, :3]
     mass_element, tensor = reader.only(inertial, "mass", where), reader.only(inertial, "inertia", where)
     if mass_element is None or tensor is None:
         raise reader.fail(where, "<inertial> needs <mass> and <inertia>; leave <inertial> out for a massless link")
@@ -131,7 +124,7 @@ def _inertia(reader: Reader, inertial: ElementTree.Element, where: str) -> pin.I
     if not np.array_equal(R, np.eye(3)):
         inertia = R @ inertia @ R.T
         inertia = 0.5 * (inertia + inertia.T)
-    return bare_inertia(mass, com, inertia)
+    return stated_inertia(mass, com, inertia)
 
 
 def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
@@ -140,7 +133,7 @@ def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
     kind = reader.text(element, "type", where)
     if kind not in _KINDS:
         raise reader.fail(where, str(UnknownNameError("joint type", kind, _KINDS)))
-    reader.no_misspelt(element, where, tags=_IN_JOINT)
+    reader.no_misspelt(element, where, tags=IN_JOINT)
     ends = []
     for tag in ("parent", "child"):
         end = reader.only(element, tag, where)
@@ -149,7 +142,7 @@ def _joint(reader: Reader, element: ElementTree.Element) -> JointEntry:
         ends.append(reader.text(end, "link", where))
     if ends[0] == ends[1]:
         raise reader.fail(where, f"joins link {ends[0]!r} to itself")
-    placement = _homogeneous(*_origin(reader, element, where))
+    placement = pose(reader, element, where)
     axis = _axis(reader, element, kind, where)
     data = _joint_data(reader, element, kind, where)
     return JointEntry(name, kind, ends[0], ends[1], placement, axis, data, _mimic(reader, element, name, where))
@@ -172,7 +165,7 @@ def _mimic(reader: Reader, element: ElementTree.Element, name: str, where: str) 
 
 def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> Array:
     stated = reader.only(element, "axis", where)
-    reader.known(stated, ("xyz",), where)
+    reader.known(stated, ("xyz", "rpy"), where)  # rpy turns no axis, and is written by some all the same
     axis = np.array(reader.numbers(stated, "xyz", 3, where, [1.0, 0.0, 0.0]))
     if kind in ("fixed", "floating"):
         return axis
@@ -186,7 +179,10 @@ def _axis(reader: Reader, element: ElementTree.Element, kind: str, where: str) -
 
 
 def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: str) -> dict[str, list[float]]:
-    """Return limits and losses; a <limit> with neither lower nor upper bounds nothing, with one the other is zero."""
+    """Return limits and losses; without <limit>, or with one of neither lower nor upper, nothing bounds the joint.
+
+    With one of the two the other is zero.
+    """
     if kind not in ("revolute", "continuous", "prismatic"):
         return {}
     limit, dynamics = reader.only(element, "limit", where), reader.only(element, "dynamics", where)
@@ -199,79 +195,13 @@ def _joint_data(reader: Reader, element: ElementTree.Element, kind: str, where: 
     for word, (value,) in data.items():
         if value < 0.0:
             raise reader.fail(where, f"{word} = {value!r} must not be negative")
-    if limit is None:
-        if kind != "continuous":
-            raise reader.fail(where, "needs <limit lower= upper= effort= velocity=>")
-        return {**data, "effort": [UNLIMITED], "velocity": [UNLIMITED]}
     for word in ("effort", "velocity"):
-        data[word] = reader.numbers(limit, word, 1, where, None, bound=UNLIMITED)
+        data[word] = reader.numbers(limit, word, 1, where, [UNLIMITED], bound=UNLIMITED)
         if data[word][0] < 0.0:
             raise reader.fail(where, f"{word} limit = {data[word][0]!r} must not be negative")
-    if kind != "continuous" and ("lower" in limit.attrib or "upper" in limit.attrib):
+    if limit is not None and kind != "continuous" and ("lower" in limit.attrib or "upper" in limit.attrib):
         data["lower"] = reader.numbers(limit, "lower", 1, where, [0.0], bound=UNLIMITED)
         data["upper"] = reader.numbers(limit, "upper", 1, where, [0.0], bound=UNLIMITED)
         if data["lower"][0] > data["upper"][0]:
             raise reader.fail(where, f"lower limit {data['lower'][0]!r} is above upper {data['upper'][0]!r}")
     return data
-
-
-def _colours(reader: Reader, robot: ElementTree.Element) -> Colours:
-    colours: Colours = {}
-    for material in robot.findall("material"):
-        colour = material.find("color")
-        if colour is not None and material.get("name"):
-            colours[str(material.get("name"))] = _rgba(reader, colour, f"material {material.get('name')!r}")
-    return colours
-
-
-def _rgba(reader: Reader, colour: ElementTree.Element, where: str) -> tuple[float, float, float, float]:
-    r, g, b, a = reader.numbers(colour, "rgba", 4, where, None)
-    return r, g, b, a
-
-
-def _visual(reader: Reader, element: ElementTree.Element, link: str, colours: Colours) -> Visual:
-    where = f"visual of link {link!r}"
-    geometry = reader.only(element, "geometry", where)
-    if geometry is None or len(geometry) != 1:
-        raise reader.fail(where, "needs one <geometry> with one shape in it")
-    shape = geometry[0]
-    mesh = ""
-    if shape.tag == "box":
-        size = reader.numbers(shape, "size", 3, where, None)
-    elif shape.tag in ("cylinder", "capsule"):
-        size = [*reader.numbers(shape, "radius", 1, where, None), *reader.numbers(shape, "length", 1, where, None)]
-    elif shape.tag == "sphere":
-        size = reader.numbers(shape, "radius", 1, where, None)
-    elif shape.tag == "mesh":
-        mesh = _mesh_file(reader.path, reader.text(shape, "filename", where))
-        size = reader.numbers(shape, "scale", 3, where, [1.0, 1.0, 1.0])
-    else:
-        raise reader.fail(
-            where, str(UnknownNameError("shape", shape.tag, ("box", "capsule", "cylinder", "sphere", "mesh")))
-        )
-    material = element.find("material")
-    rgba = _GREY
-    if material is not None:
-        colour = material.find("color")
-        known = colours.get(material.get("name") or "", _GREY)
-        rgba = known if colour is None else _rgba(reader, colour, where)
-    placement = _homogeneous(*_origin(reader, element, where))
-    try:
-        return Visual(link, shape.tag, tuple(size), placement, rgba, mesh)
-    except InvalidInputError as error:
-        raise reader.fail(where, str(error)) from error
-
-
-def _mesh_file(urdf: Path, filename: str) -> str:
-    """Return where the mesh is when it can be found, else what the file calls it."""
-    if filename.startswith("package://"):
-        rest = filename[len("package://") :].lstrip("/")
-        candidates = [folder / rest for folder in urdf.resolve().parents]
-    elif filename.startswith("file://"):
-        candidates = [Path(filename[len("file://") :])]
-    else:
-        candidates = [urdf.parent / filename]
-    try:
-        return next((str(c) for c in candidates if c.is_file()), filename)
-    except (OSError, ValueError):
-        return filename

@@ -7,6 +7,7 @@ import re
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin._files import MAX_BYTES, read_bounded
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 
-__all__ = ["HUGE", "UNIT", "UNLIMITED", "Reader", "direction", "parse_xml"]
+__all__ = ["HUGE", "UNIT", "UNLIMITED", "Reader", "direction", "parse_text", "parse_xml"]
 
 MAX_DEPTH = 200
 MAX_ELEMENTS = 200_000
@@ -26,6 +27,7 @@ HUGE = 1e30
 UNLIMITED = sys.float_info.max
 """What Pinocchio writes for a limit that is none."""
 
+_DECLARATION = re.compile(rb"<\?xml\s[^>]*\?>")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -48,7 +50,7 @@ class _Builder(ElementTree.TreeBuilder):
         self._depth -= 1
         return super().end(tag)
 
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+    def doctype(self, *_: object) -> None:
         """Refuse the declaration that entity bombs live in."""
         raise FileFormatError(self._path, "has a DOCTYPE or entities, which are not read; remove the declaration")
 
@@ -59,16 +61,31 @@ def parse_xml(path: Path, *, root: str | None, max_bytes: int = MAX_BYTES) -> El
     Raises:
         FileFormatError: not readable, not well formed, hostile, or another kind of file.
     """
-    parser = ElementTree.XMLParser(target=_Builder(path))
+    return parse_text(path, read_bounded(path, max_bytes), roots=() if root is None else (root,))
+
+
+def parse_text(path: Path, text: bytes, *, roots: tuple[str, ...]) -> ElementTree.Element:
+    """Return the root element of a text that came from a file; its tag must be one of `roots`, if there are any.
+
+    Names are as they are written, with their prefixes, declared or not. An XML declaration that does not stand first,
+    as after a licence in a comment, is passed over. Simulators do both.
+
+    Raises:
+        FileFormatError: not well formed, hostile, or another kind of file.
+    """
+    parser, builder = expat.ParserCreate(), _Builder(path)
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, builder.doctype
     try:
-        parser.feed(read_bounded(path, max_bytes))
-        element = parser.close()
+        parser.Parse(text[:1] + _DECLARATION.sub(b"", text[1:]), True)
+        element = builder.close()
     except FileFormatError:
         raise
-    except (ElementTree.ParseError, LookupError, ValueError, RecursionError) as error:
+    except (expat.ExpatError, LookupError, ValueError, RecursionError) as error:
         raise FileFormatError(path, f"is not well-formed XML ({error})") from error
-    if not isinstance(element, ElementTree.Element) or root not in (element.tag, None):
-        raise FileFormatError(path, f"has the root element <{getattr(element, 'tag', None)}>; expected <{root}>")
+    if roots and element.tag not in roots:
+        expected = " or ".join(f"<{root}>" for root in roots)
+        raise FileFormatError(path, f"has the root element <{element.tag}>; expected {expected}")
     return element
 
 

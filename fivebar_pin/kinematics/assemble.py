@@ -12,8 +12,9 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.engine.tables import unwritten
 from fivebar_pin.errors import AssemblyError, SingularityError
 from fivebar_pin.kinematics.follow import blocked, require_near
-from fivebar_pin.mechanism.closing import CLOSED, closed_enough, most_open, polish, residual_of, search
+from fivebar_pin.mechanism.closing import CLOSED, closed_enough, most_open, nudged, polish, residual_of, search
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 
@@ -30,7 +31,6 @@ __all__ = [
 STARTS = 64  # of a search, unless told otherwise
 _FOLLOWED = 1e-8  # closure residual of `near` up to which its assembly mode is followed from there [m or rad]
 _TOO_FAR, _BOTH_ENDS = -2, 2  # how a way ended, see `engine.entries.bring`
-_NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
 _MOST_STARTS = 100_000  # random starts of one search; all are held in memory at once
 _TURNS = 3.0  # half turns, either way, over which searches start for joints that count their turns
 
@@ -64,6 +64,7 @@ def assemble(
         AssemblyError: the loops do not close; names the closure that stays open and by how much.
         SingularityError: the way from `near` is blocked by a singularity.
     """
+    chain = at_rest(chain)
     checked_search(chain, starts, seed, tolerance)
     x = numeric("q_actuated", q_actuated)
     if x.ndim == 2:
@@ -154,7 +155,9 @@ def _opposed(loops: Loops, q: Array) -> bool:
 
 def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:
     """Return the closed configuration (nq,) nearest to q (1, nq) that searches from there lead to."""
-    for starts in (q, _nudged(loops, q, x)):  # a search that starts at a saddle stays there: step aside
+    about = nudged(loops, q)
+    loops.set_actuated(about, x)
+    for starts in (q, about):
         found = search(loops, starts)
         closed = polish(loops, found)
         opposed = loops.opposed(loops.see(closed.q))
@@ -163,15 +166,6 @@ def _searched_near(loops: Loops, q: Array, x: Array, tolerance: float) -> Array:
             away = loops.tree.difference(q, closed.q[good]) / loops.column_scale
             return np.asarray(closed.q[good[int(np.argmin(np.abs(away).max(axis=1)))]])
     raise open_message(loops, _smallest(residual_of(loops, found)), f"at the actuated coordinates {x.tolist()}")
-
-
-def _nudged(loops: Loops, q: Array, x: Array) -> Array:
-    """Return starts (k, nq) about q (1, nq)."""
-    rng = np.random.default_rng(0)
-    tangent = _NUDGE * rng.uniform(-1.0, 1.0, (_NUDGES, loops.tree.nv)) * loops.column_scale
-    starts = loops.tree.integrate(np.repeat(q, _NUDGES, axis=0), tangent)
-    loops.set_actuated(starts, x)
-    return starts
 
 
 def closed_from_starts(
@@ -190,9 +184,14 @@ def closed_from_starts(
         return q[:1], np.zeros(0)
     found = search(loops, q)
     closed = polish(loops, found)
-    good = closed_enough(loops, closed.residual, tolerance)
-    good &= ~loops.opposed(loops.see(closed.q))
-    return closed.q[good], _smallest(residual_of(loops, found))
+    lost = ~np.isfinite(closed.residual)  # by Newton's method, where loops are folded
+    q, sizes = (
+        np.where(lost[:, None], found, closed.q),
+        np.where(lost, Configurations(loops, found).gap, closed.residual),
+    )
+    good = closed_enough(loops, sizes, tolerance)
+    good &= ~loops.opposed(loops.see(q))
+    return q[good], _smallest(residual_of(loops, found))
 
 
 def _counted(chain: ClosedChain) -> list[int]:

@@ -9,6 +9,7 @@ from fivebar_pin._arrays import Array, checked, finite, numeric
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.mechanism.complement import complement_of, require_regular
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import loops_of
 
 __all__ = ["complement"]
@@ -28,7 +29,7 @@ def complement(chain: ClosedChain, q: npt.ArrayLike) -> Array:
     Raises:
         SingularityError: the actuated joints do not determine the motion at q.
     """
-    loops = loops_of(chain)
+    loops = loops_of(at_rest(chain))
     loops.require_determined()
     Q = numeric("q", q)
     single = Q.ndim == 1

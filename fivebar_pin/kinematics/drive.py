@@ -13,6 +13,7 @@ from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityErro
 from fivebar_pin.kinematics.assemble import assemble_near, assemble_somewhere
 from fivebar_pin.kinematics.follow import follow
 from fivebar_pin.mechanism.closing import CLOSED, most_open, residual_of
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.prepared import prepared_of
@@ -57,6 +58,7 @@ def drive(
     number("tolerance", tolerance, positive=True)
     if threads is not None:
         integer("threads", threads, least=1)
+    chain = at_rest(chain)
     loops = loops_of(chain)
     loops.require_determined()
     if motion.na != chain.na:

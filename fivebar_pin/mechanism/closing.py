@@ -29,6 +29,7 @@ __all__ = [
     "closed_enough",
     "iterate",
     "most_open",
+    "nudged",
     "polish",
     "residual_of",
     "search",
@@ -41,11 +42,12 @@ of them go on (k,); those that do not stay where they are put."""
 
 CLOSED = 1e-12  # closure residual that counts as closed: some thousand units in the last place [m or rad]
 STEP = 0.5  # longest Newton step of a damped search [rad, or chain lengths]
+_NUDGES, _NUDGE = 8, 0.2  # further starts about a poor one, and how far off [rad, or chain lengths]
 _BLOCK = 4096  # samples polished at a time, so that what is computed on the way stays in cache
 _POLISHED = 1e-9  # scaled residual below which one more Newton step reaches round-off: it squares it [-]
 _ASTRAY = 1e3  # sum of Newton steps beyond which a sample is given up [rad, or chain lengths]
 
-_CONTENT = 1e-20  # half the squared scaled residual that a search is content with: 1e-10, for `polish` to end [-]
+_CONTENT = 1e-26  # half the squared scaled residual that a search is content with, also where loops are folded [-]
 _FLAT = 1e-14  # gradient of it below which the search stands at a stationary point [-]
 _DAMPING = 1e-3  # of the first step, as part of the mean slope [-]
 _LEAST_DAMPING, _MOST_DAMPING, _STUCK = 1e-12, 1e8, 1e7  # bounds, and from where on steps lead nowhere [-]
@@ -128,8 +130,15 @@ def closed_enough(loops: Loops, residual: npt.ArrayLike, tolerance: float) -> np
 
 
 def most_open(loops: Loops, tolerance: float) -> float:
-    """Return the residual up to which a configuration is closed: the tolerance times the chain's length (or 1 rad)."""
-    return tolerance * max(1.0, loops.length)
+    """Return the residual up to which a configuration is closed: the larger tolerance, times a length above 1 m."""
+    return max(tolerance, loops.tolerance) * max(1.0, loops.length)
+
+
+def nudged(loops: Loops, q: Array) -> Array:
+    """Return starts (k, nq) about q (1, nq): a search that starts at a saddle stays there, and has to step aside."""
+    rng = np.random.default_rng(0)
+    tangent = _NUDGE * rng.uniform(-1.0, 1.0, (_NUDGES, loops.tree.nv)) * loops.column_scale
+    return loops.tree.integrate(np.repeat(q, _NUDGES, axis=0), tangent)
 
 
 def polish(loops: Loops, q: Array, *, iterations: int = 8) -> Closed:

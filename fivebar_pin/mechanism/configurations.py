@@ -82,12 +82,12 @@ class Configurations:
     @lazy
     def independent(self) -> Decomposed:
         """The Jacobian of the independent combinations of rows, scaled and decomposed."""
-        return Decomposed.of(np.matmul(self.loops.reduce, self.J) * self.loops.column_scale)
+        return Decomposed.of(np.matmul(self.loops.reduce, self.J) * self.loops.column_scale, self.loops.misfit)
 
     @lazy
     def whole(self) -> Decomposed:
         """The Jacobian of all rows, scaled and decomposed."""
-        return Decomposed.of(self.loops.scaled(self.J))
+        return Decomposed.of(self.loops.scaled(self.J), self.loops.misfit)
 
     @property
     def rank(self) -> int:

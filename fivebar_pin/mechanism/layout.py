@@ -16,6 +16,7 @@ from fivebar_pin.chain import find_frame
 from fivebar_pin.chain.masses import turned
 from fivebar_pin.closures.anchored import Anchored
 from fivebar_pin.closures.frame_closure import AnchoredFrames
+from fivebar_pin.closures.rest import AnchoredStill
 from fivebar_pin.closures.rows import Row
 from fivebar_pin.engine import tables as e
 from fivebar_pin.mechanism.dimensions import Dimensions, dimensions_of
@@ -24,7 +25,7 @@ from fivebar_pin.springs import JointSpring, Spring
 
 __all__ = ["SORTS", "Block", "Parts", "blocks_of", "constants_of", "joined_rows", "layout_of"]
 
-SORTS = {"along": e.ALONG, "tilt": e.TILT, "turned": e.TURNED, "length": e.LENGTH}
+SORTS = {"along": e.ALONG, "tilt": e.TILT, "turned": e.TURNED, "length": e.LENGTH, "spin": e.SPIN}
 """Sorts of rows between frames, by their word."""
 _TOGETHER = 1e-12  # distance of a spring's ends that is round-off: they lie on one point [chain lengths]
 
@@ -151,6 +152,7 @@ class Parts:
         length: of the chain [m].
         left: of every closure, combinations of its rows that say nothing anywhere, where they are known.
         dimensions: of other designs, one or many, in place of its own.
+        misfit: scaled residual up to which closures count as met [-].
         bodiless: whether bodies that weigh nothing get a place as well: in other designs they may be some.
     """
 
@@ -164,6 +166,7 @@ class Parts:
     left: Sequence[Sequence[Row]] = ()
     dimensions: Dimensions | None = None
     bodiless: bool = False
+    misfit: float = 0.0
 
 
 def layout_of(parts: Parts) -> tuple[e.Integers, Array]:
@@ -263,6 +266,7 @@ class _Layout:
         self.head[e.SCALE] = self._put(parts.scale)
         losses = (model.armature, model.damping, model.upperDryFrictionLimit)
         self.head[e.LOSSES] = self._put(np.column_stack([np.array(x) for x in losses]))
+        self.head[e.MISFIT] = self._put([parts.misfit])
         return {
             "fixed": [self._put(np.zeros(14)), *(self._put_each(self._fixed(x)) for x in parts.links)],
             "mass": [-1, *(self._mass(j) for j in range(1, len(parts.links) + 1))],
@@ -350,7 +354,7 @@ class _Layout:
             e.J_HERE: jacobian,
             e.J_BEFORE: jacobian, e.SIGNS: nb, e.NORMS: nb, e.SIGNS_BEFORE: nb, e.NORMS_BEFORE: nb, e.REACH: 1,
             e.LAST_STEP: 1, e.SECOND_STEP: 1, e.CLOSED: 1, e.GOING: 1, e.STATUS: 1, e.TO: na, e.M_BAR: na * na,
-            e.TO_V: na, e.TO_A: na,
+            e.TO_V: na, e.TO_A: na, e.CORRECTION: 1,
         }  # fmt: skip
         for field, count in sizes.items():
             head[field] = self._room(count)
@@ -456,7 +460,7 @@ class _Layout:
                     e.POSE1: memory["pose"][i], e.POSE2: memory["pose"][j], e.RATE1: memory["rate"][i],
                     e.RATE2: memory["rate"][j], e.FRAMES: constants["frames"][n], e.ROW0: start,
                     e.ROW0_END: start + e.ROW_SIZE * count, e.ENTRY0: entries[n], e.ENTRY0_END: end,
-                    e.TIES: not between,
+                    e.TIES: 0 if between else 2 if isinstance(anchored, AnchoredStill) else 1,
                 },
             )  # fmt: skip
             for row in range(count):

@@ -62,6 +62,8 @@ class Loops:
         m: number of closure rows.
         reduce: constant row combinations that are independent in general, (r, m); all redundancy that holds at every
             configuration (the out-of-plane rows of a planar loop) is gone from them, and their unit is one.
+        tolerance: how far closures may stay open for good [m or rad; times the length above 1 m].
+        misfit: the same as a scaled residual [-].
         column_scale: unit of every velocity coordinate (nv,): 1 for angles, the chain's length for slides.
         unit: what a residual is multiplied by to be one of lengths and angles (m,): 1 but for rows of coordinates,
             which say the same whatever factor they are multiplied by.
@@ -74,6 +76,8 @@ class Loops:
         self.closures = chain.closures
         self.actuated, self.passive = chain.actuated_index, chain.passive_index
         self.length = chain.length
+        self.tolerance = chain.closure_tolerance
+        self.misfit = self.tolerance * max(1.0, 1.0 / self.length)
         self.anchored: list[Anchored] = []
         frames, self.m = frames_by_name(model) if chain.closures else {}, 0
         for closure in chain.closures:
@@ -171,7 +175,7 @@ class Loops:
 
     def rank(self, J: Array) -> int:
         """Return the rank of one closure Jacobian (m, nv)."""
-        return int(ranks_of(singular_values(self.scaled(J))))
+        return int(ranks_of(singular_values(self.scaled(J)), self.misfit))
 
     def worst(self, residual: Array) -> tuple[str, float]:
         """Return the closure that one residual (m,) leaves open the most, and by how much."""
@@ -179,9 +183,14 @@ class Loops:
         k = int(np.argmax(sizes))
         return self.anchored[k].closure.name, sizes[k]
 
+    @property
+    def lacking(self) -> int:
+        """Number of passive coordinates for which there is no row."""
+        return int(self.passive.size - sum(min(g.reduce.shape[0], g.passive.size) for g in self._groups))
+
     def require_determined(self) -> None:
         """Raise unless the actuated joints can determine the motion."""
-        lacking = self.passive.size - sum(min(g.reduce.shape[0], g.passive.size) for g in self._groups)
+        lacking = self.lacking
         if lacking:
             raise InvalidInputError(
                 "actuated joints",

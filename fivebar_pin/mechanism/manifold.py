@@ -25,7 +25,7 @@ from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.per_chain import once_per_chain
-from fivebar_pin.mechanism.rank import SINGULAR
+from fivebar_pin.mechanism.rank import ROUNDED, SINGULAR
 
 __all__ = ["ROUND_OFF", "Chart", "Manifold", "manifold_of"]
 
@@ -144,9 +144,19 @@ class Manifold:
             step = rng.normal(size=tangent.shape[0]) @ tangent
             away = _PROBE_STEP * step / max(float(np.abs(step).max(initial=0.0)), TINY)
             near = self._nearest(self.loops.tree.integrate(q[None], (away * self.scale)[None])[0], _PROBE_STEPS)
-            if np.abs(near.reduced).max(initial=0.0) < _SETTLED:
-                best = max(best, int(np.sum(near.independent.s[0] > SINGULAR)))
+            if np.abs(near.reduced).max(initial=0.0) < _settled(self.loops):
+                best = max(best, int(np.sum(near.independent.s[0] > _least(self.loops))))
         return best
+
+
+def _settled(loops: Loops) -> float:
+    """Return the scaled residual below which an iteration that gets no further has ended: round-off, or a misfit."""
+    return max(_SETTLED, ROUNDED * loops.misfit)
+
+
+def _least(loops: Loops) -> float:
+    """Return the singular value above which a direction counts."""
+    return max(SINGULAR, ROUNDED * loops.misfit)
 
 
 class _LeastSteps:
@@ -159,13 +169,13 @@ class _LeastSteps:
 
     def __call__(self, here: Configurations, which: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.bool_]]:
         size = float(np.abs(here.reduced).max(initial=0.0))
-        if size >= self._open and self._open < _SETTLED:  # round-off: the last one was no worse
+        if size >= self._open and self._open < _settled(here.loops):  # round-off: the last one was no worse
             return self.reached.q, np.zeros(1, dtype=np.bool_)
         self.reached, self._open = here, size
         if size <= ROUND_OFF:
             return here.q, np.zeros(1, dtype=np.bool_)
         J = here.independent
-        step = -J.solve(here.reduced, int(np.sum(J.s[0] > SINGULAR)))
+        step = -J.solve(here.reduced, int(np.sum(J.s[0] > _least(here.loops))))
         step *= min(1.0, STEP / max(float(np.abs(step).max(initial=0.0)), TINY))
         return here.loops.tree.integrate(here.q, step * here.loops.column_scale), np.ones(1, dtype=np.bool_)
 
@@ -182,7 +192,7 @@ class _ChartSteps:
     def __call__(self, here: Configurations, which: npt.NDArray[np.intp]) -> tuple[Array, npt.NDArray[np.bool_]]:
         off = self._xi - self._manifold.coordinates(self._chart, here.q[0])
         size = max(float(np.abs(here.reduced).max(initial=0.0)), float(np.abs(off).max(initial=0.0)))
-        if size <= self._enough or (size < _SETTLED and size >= 0.5 * self._last):
+        if size <= self._enough or (size < _settled(here.loops) and size >= 0.5 * self._last):
             self.reached = here
         step = None if self.reached is not None or not size < _LOST else self._step(here, off)
         self._last = size

@@ -14,13 +14,14 @@ import pinocchio as pin
 
 from fivebar_pin._arrays import TINY, Array, block_svd
 from fivebar_pin.chain import ClosedChain
-from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate, search
+from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate, nudged, search
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import ranks_of, singular_values, truncated_inverse
 
 __all__ = [
     "close_all",
+    "closed_from",
     "determining_sets",
     "first_closed",
     "gap",
@@ -34,6 +35,8 @@ __all__ = [
 
 _NEWTON = 8  # steps of Newton's method in all coordinates
 _NOTHING = 1e-8  # weight of a row in a combination that is round-off, pivots being one [-]
+_SLACK = 1e-9  # how far beyond a limit a coordinate still lies on it [rad or m]
+_WIDE = 1e3  # limit from which on a coordinate is not drawn between its limits [rad or m]
 _STARTS = 48  # random starts when no configuration is given
 _WALKERS, _STRIDES = 8, 2  # samples and steps of the walk that finds generic configurations
 _ENTRIES = 400_000  # numbers in the Jacobians of all of them at a time
@@ -80,7 +83,7 @@ class _AllCoordinates:
         residual = here.residual * loops.row_scale
         step = np.zeros((which.size, loops.tree.nv))
         for g, block in zip(loops.independent, here.blocks, strict=True):
-            inverse = truncated_inverse(loops.scaled(block, g.rows, g.columns))
+            inverse = truncated_inverse(loops.scaled(block, g.rows, g.columns), loops.misfit)
             step[:, g.columns] = -np.matmul(inverse, residual[:, g.rows, None])[..., 0]
         step[self._good[which]] = 0.0
         q = loops.tree.integrate(here.q, np.clip(step, -STEP, STEP) * loops.column_scale)
@@ -88,23 +91,61 @@ class _AllCoordinates:
 
 
 def first_closed(chain: ClosedChain, seed: int, tolerance: float) -> tuple[Array, float]:
-    """Find a closed configuration from the neutral one, else the first from random ones; the best one if none closes.
+    """Find a closed configuration from the named ones, the neutral one, else from random ones, in this order.
+
+    The first one within the joint limits is taken, else the first one; the best one if none closes.
 
     Returns:
         The configuration (nq,) and its largest residual [m or rad].
     """
     loops = loops_of(chain)
     neutral = np.array(pin.neutral(chain.model))
-    best, residual = close_all(chain, neutral[None], tolerance)
-    if closed_enough(loops, residual, tolerance)[0]:
-        return best[0], float(gap(loops, best)[0])
-    rng, count = np.random.default_rng(seed), _affordable(_STARTS, loops)
-    tangent = rng.uniform(-np.pi, np.pi, (count, loops.tree.nv)) * loops.column_scale
-    q, sizes = close_all(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), tolerance)
-    q, sizes = np.concatenate([best, q]), np.concatenate([residual, sizes])
-    closed = np.flatnonzero(closed_enough(loops, sizes, tolerance))
-    k = int(closed[0] if closed.size else np.argmin(sizes))  # which of the closed ones is best is round-off
+    q, sizes = close_all(chain, np.stack([*chain.references.values(), neutral]), tolerance)
+    k = _best(chain, loops, q, sizes, tolerance)
+    if k is None:
+        rng, count = np.random.default_rng(seed), _affordable(_STARTS, loops)
+        tangent = rng.uniform(-np.pi, np.pi, (count, loops.tree.nv)) * loops.column_scale
+        starts = _within_limits(chain, loops.tree.integrate(np.repeat(neutral[None], count, axis=0), tangent), rng)
+        more, further = close_all(chain, starts, tolerance)
+        q, sizes = np.concatenate([q, more]), np.concatenate([sizes, further])
+        k = _best(chain, loops, q, sizes, tolerance)
+    if k is None:  # which of the closed ones is best is round-off
+        closed = np.flatnonzero(closed_enough(loops, sizes, tolerance))
+        k = int(closed[0] if closed.size else np.argmin(sizes))
     return q[k], float(gap(loops, q[k : k + 1])[0])
+
+
+def closed_from(chain: ClosedChain, q: Array, tolerance: float) -> Array:
+    """Close the loops from q (nq,), or from places about it where a search that starts there stays; the best found."""
+    loops = loops_of(chain)
+    found, sizes = close_all(chain, q[None], tolerance)
+    if not closed_enough(loops, sizes, tolerance)[0]:
+        more, further = close_all(chain, nudged(loops, q[None]), tolerance)
+        found, sizes = np.concatenate([found, more]), np.concatenate([sizes, further])
+    closed = np.flatnonzero(closed_enough(loops, sizes, tolerance))
+    return np.asarray(found[int(closed[0] if closed.size else np.argmin(sizes))])
+
+
+def _best(chain: ClosedChain, loops: Loops, q: Array, sizes: Array, tolerance: float) -> int | None:
+    """Return the first of configurations q (n, nq) that is closed and within the limits."""
+    low, high = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
+    inside = np.all((q >= low - _SLACK) & (q <= high + _SLACK), axis=1)
+    good = np.flatnonzero(closed_enough(loops, sizes, tolerance) & inside)
+    return int(good[0]) if good.size else None
+
+
+def _within_limits(chain: ClosedChain, q: Array, rng: np.random.Generator) -> Array:
+    """Return configurations q (n, nq) with coordinates outside their limits drawn again, or put on the nearer one."""
+    low, high = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
+    single = [j for j in range(1, chain.model.njoints) if chain.model.nqs[j] == 1]
+    out = np.array(q)
+    for k in (int(chain.model.idx_qs[j]) for j in single):
+        outside = (out[:, k] < low[k]) | (out[:, k] > high[k])
+        if outside.any():
+            narrow = low[k] > -_WIDE and high[k] < _WIDE
+            drawn = rng.uniform(low[k], high[k], len(q)) if narrow else np.clip(out[:, k], low[k], high[k])
+            out[outside, k] = drawn[outside]
+    return out
 
 
 def _affordable(count: int, loops: Loops) -> int:
@@ -198,7 +239,7 @@ def passive_sigma(loops: Loops, J: Array, actuated: npt.NDArray[np.intp]) -> flo
     if not passive.size:
         return 1.0
     s = singular_values(loops.scaled(with_held(J, actuated)))
-    return float(s[passive.size - 1]) if ranks_of(s) == passive.size else 0.0
+    return float(s[passive.size - 1]) if ranks_of(s, loops.misfit) == passive.size else 0.0
 
 
 def determining_sets(chain: ClosedChain, site: Configurations, most: int) -> list[tuple[tuple[str, ...], float]]:

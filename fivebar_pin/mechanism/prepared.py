@@ -86,6 +86,7 @@ def _taken_apart(loops: Loops, chain: ClosedChain) -> tuple[Parts, tuple[Array, 
         loops.column_scale,
         loops.length,
         [x.left for x in kept],
+        misfit=loops.misfit,
     )
     return parts, _mixes(loops, [x.mixes for x in kept])
 

@@ -24,6 +24,7 @@ __all__ = [
     "HELD",
     "LEFT_OUT",
     "RANK_TOLERANCE",
+    "ROUNDED",
     "SINGULAR",
     "TIED",
     "UNDRIVEN",
@@ -50,6 +51,8 @@ SINGULAR = 1e-7
 A residual of round-off, 1e-15, leaves such a coordinate open by 1e-8, and its accelerations, which go with the square
 of the inverse, without a digit.
 """
+ROUNDED = 10.0
+"""Singular value up to which rows that contradict each other by a misfit are one, in misfits [-]."""
 LEFT_OUT = 1e-6
 """Singular value left out of a Newton step in all coordinates, as part of the largest [-].
 
@@ -87,6 +90,7 @@ class Decomposed:
         U: (n, m, m).
         s: singular values, descending (n, k).
         Vt: (n, nv, nv).
+        misfit: scaled residual of closures that are met as far as they can be [-], see `Loops`.
 
     Wherever a method takes a rank, it is that to work with for the whole batch; forces take one for each configuration
     too (n,), since what closures carry at one must not depend on what they can carry at another.
@@ -95,22 +99,23 @@ class Decomposed:
     U: Array
     s: Array
     Vt: Array
+    misfit: float = 0.0
 
     @staticmethod
-    def of(J: Array) -> Decomposed:
+    def of(J: Array, misfit: float = 0.0) -> Decomposed:
         """Decompose scaled Jacobians (n, m, nv); a single one block by block when it is large."""
         n, m, nv = J.shape
         if not m:
-            return Decomposed(np.zeros((n, 0, 0)), np.zeros((n, 0)), np.broadcast_to(np.eye(nv), (n, nv, nv)))
+            return Decomposed(np.zeros((n, 0, 0)), np.zeros((n, 0)), np.broadcast_to(np.eye(nv), (n, nv, nv)), misfit)
         if n == 1:
             U, s, Vt = block_svd(J[0])
-            return Decomposed(U[None], s[None], Vt[None])
-        return Decomposed(*np.linalg.svd(J, full_matrices=True))
+            return Decomposed(U[None], s[None], Vt[None], misfit)
+        return Decomposed(*np.linalg.svd(J, full_matrices=True), misfit)
 
     @property
     def ranks(self) -> npt.NDArray[np.intp]:
         """Rank at every configuration (n,)."""
-        return ranks_of(self.s)
+        return ranks_of(self.s, self.misfit)
 
     @property
     def rank(self) -> int:
@@ -202,9 +207,10 @@ def factored(J: Array, rank: int) -> Factored:
     return Factored(V[:, :, rank:], back, s[:, rank - 1] if rank else np.ones(n), s[:, rank])
 
 
-def ranks_of(s: Array) -> npt.NDArray[np.intp]:
-    """Return the rank that singular values (..., k), descending, stand for (...)."""
-    return np.asarray(np.sum(s > RANK_TOLERANCE * np.maximum(1.0, s[..., :1]), axis=-1))
+def ranks_of(s: Array, misfit: float = 0.0) -> npt.NDArray[np.intp]:
+    """Return the rank that singular values (..., k), descending, stand for (...), of closures with that misfit."""
+    least = max(RANK_TOLERANCE, ROUNDED * misfit)
+    return np.asarray(np.sum(s > least * np.maximum(1.0, s[..., :1]), axis=-1))
 
 
 def singular_values(J: Array) -> Array:
@@ -219,9 +225,9 @@ def smallest_values(M: Array) -> Array:
     return np.asarray(np.linalg.svd(M, compute_uv=False)[:, -1])
 
 
-def truncated_inverse(J: Array) -> Array:
+def truncated_inverse(J: Array, misfit: float = 0.0) -> Array:
     """Return pseudo-inverses (n, nv, m) of scaled Jacobians without their flat directions, see `LEFT_OUT`."""
-    return np.asarray(np.linalg.pinv(J, rcond=LEFT_OUT))
+    return np.asarray(np.linalg.pinv(J, rcond=max(LEFT_OUT, ROUNDED * misfit)))
 
 
 def pseudo_inverse(J: Array) -> tuple[Array, Array]:

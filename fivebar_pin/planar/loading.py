@@ -12,7 +12,7 @@ from fivebar_pin._files import MAX_BYTES, as_path
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError, InvalidInputError
-from fivebar_pin.io._load import is_linkage_file
+from fivebar_pin.io._find import TREES, is_linkage_file
 from fivebar_pin.planar._reading import load as load_linkage
 
 __all__ = ["load"]
@@ -25,23 +25,30 @@ def load(
     closures: Iterable[Closure] | None = None,
     actuated: Iterable[str] | None = None,
     gravity: npt.ArrayLike | None = None,
+    fixed_base: bool = False,
+    closure_tolerance: float = 0.0,
     max_bytes: int = MAX_BYTES,
 ) -> ClosedChain:
     """Load a closed chain: a linkage file (YAML with the key `linkage`), or what `fivebar_pin.io.load` reads.
 
     Args:
-        path: a linkage file (see `fivebar_pin.planar.load`); a folder with one URDF (and its sidecar), one MJCF
-            file, or one linkage file and no other mechanism;
-            a .urdf file whose sidecar lies beside it; an MJCF .xml file; or the name of a mechanism that ships
+        path: a linkage file (see `fivebar_pin.planar.load`); a folder with one URDF (and its sidecar), one file of
+            another format, or one linkage file and no other mechanism; a .urdf, .sdf, .world or .xacro file, whose
+            sidecar lies beside it where it needs one; an MJCF .xml file; or the name of a mechanism that ships
             (`fivebar_pin.io.shipped`), where no file or folder is called so.
-        free_flyer: put the root of a URDF on a free-flying base.
+        free_flyer: put the root of a URDF or SDF on a free-flying base.
         closures: use these instead of the file's closures; with `actuated`, no sidecar is needed. Not for linkages.
         actuated: drive these joints instead of the file's.
         gravity: use this (3,) [m/s2] instead of the file's.
-        max_bytes: size above which a URDF or MJCF file is not read.
+        fixed_base: hold what floats where it stands, see `ClosedChain.with_fixed_base`.
+        closure_tolerance: how far loops of rounded dimensions may stay open, see `ClosedChain` [m or rad].
+        max_bytes: size above which a file is not read.
 
     Returns:
         The chain; meshes are named in its visuals but not read.
+
+    Warns:
+        LeftOutWarning: what a file states and the mechanism goes without, in one line.
 
     Raises:
         FileFormatError: a file is missing, malformed or states something impossible; names file, element, way out.
@@ -50,18 +57,21 @@ def load(
     """
     file = _linkage_of(as_path(path))
     if not is_linkage_file(file):
-        return io.load(
+        chain = io.load(
             path, free_flyer=free_flyer, closures=closures, actuated=actuated, gravity=gravity, max_bytes=max_bytes
         )
-    if free_flyer or closures is not None:
-        word = "free_flyer" if free_flyer else "closures"
-        raise InvalidInputError(word, free_flyer or closures, "is for URDF and MJCF files; this is a linkage")
+        chain = chain.with_fixed_base() if fixed_base else chain
+        return chain.with_tolerance(closure_tolerance) if closure_tolerance else chain
+    for word, given in (("free_flyer", free_flyer), ("fixed_base", fixed_base), ("closures", closures is not None)):
+        if given:
+            raise InvalidInputError(word, given, "is for trees (URDF, SDF, MJCF); this is a linkage")
     linkage = load_linkage(file)
     try:
         chain = linkage.chain()
     except FiveBarPinError as error:
         raise FileFormatError(file, str(error)) from error
     chain = chain if actuated is None else chain.with_actuated(actuated)
+    chain = chain.with_tolerance(closure_tolerance) if closure_tolerance else chain
     return chain if gravity is None else chain.with_gravity(gravity)
 
 
@@ -72,5 +82,5 @@ def _linkage_of(path: Path) -> Path:
     except OSError:
         return path  # whoever reads it says why it cannot be read
     linkages = [file for file in files if is_linkage_file(file)]
-    others = [file for file in files if file.suffix.lower() in (".urdf", ".xml")]
+    others = [file for file in files if file.suffix.lower() in (*TREES, ".xml")]
     return linkages[0] if len(linkages) == 1 and not others else path

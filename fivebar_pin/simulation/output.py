@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
 from fivebar_pin._arrays import Array
+from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.equations import EquationsOfMotion
+from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.closing import CLOSED
+from fivebar_pin.mechanism.complement import complement_of
 from fivebar_pin.mechanism.configurations import Configurations
+from fivebar_pin.mechanism.idle import at_rest
+from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.mechanism.rank import UNDRIVEN, smallest_values
 from fivebar_pin.simulation.chart_motion import ChartMotion, Node, between, failure, sigma_of
 from fivebar_pin.simulation.singular_step import lagrange
@@ -61,6 +67,17 @@ class Record:
         return Trajectory(self.times, self.q, self.v, self.a, N, self.residual)
 
 
+def _beside_idle(chain: ClosedChain, q: Array, N: Array) -> Array:
+    """Return N where all that the motors leave undetermined moves nothing else: what is free needs no force."""
+    loops = loops_of(at_rest(chain))
+    if not loops.lacking:
+        here = Configurations(loops, q)
+        regular = here.passive.sigma > UNDRIVEN
+        with suppress(InvalidInputError):  # motors that are tied to each other
+            N[regular] = complement_of(here)[regular]
+    return N
+
+
 def _close(node: Node, reached: Node) -> float:
     """Return the singular value below which round-off shows in a state between two nodes."""
     return min(_CLOSE, _DIP * max(node.sigma, reached.sigma))
@@ -103,8 +120,10 @@ def _complement(system: EquationsOfMotion, q: Array, rank: int) -> Array:
     """
     chain, index = system.chain, system.chain.actuated_index
     N = np.full((q.shape[0], chain.nv, chain.na), np.nan)
-    if chain.na < chain.nv - rank or not chain.na:
+    if not chain.na:
         return N
+    if chain.na < chain.nv - rank:
+        return _beside_idle(chain, q, N)
     tangent, scale = system.manifold.at(q).independent.tangent(rank), system.manifold.scale
     driven = tangent[:, index]  # what the motors see of it (n, na, f)
     regular = smallest_values(driven) > UNDRIVEN

@@ -12,6 +12,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.errors import InvalidInputError, UnknownNameError
 from fivebar_pin.kinematics import assemble
 from fivebar_pin.kinematics.follow import require_near
+from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import loops_of
 from fivebar_pin.motion import Motion
 from fivebar_pin.sweeps.problem import Problem
@@ -40,6 +41,7 @@ def posed(
     (values, pi, n), terms, point = designs, terms_of(of), checked("about", about, (3,))
     if limits not in ("check", "ignore"):
         raise InvalidInputError("limits", limits, "must be 'check' or 'ignore'")
+    chain = at_rest(chain)
     loops = loops_of(chain)
     loops.require_determined()
     if motion.na != chain.na:

@@ -292,3 +292,31 @@ def test_a_body_without_mass_has_no_negative_moments():
     pi[1] = [0.0, 0.0, 0.0, 0.0, -1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
     with pytest.raises(InvalidInputError, match=r"inertia of the body of joint coupler.*no negative moments"):
         chain.with_inertial_parameters(pi)
+
+
+def test_a_floating_base_is_fixed_where_it_stands():
+    """The loops, the motors and the motion of the joints are those of the base held; what it carries stays."""
+    model = pin.Model()
+    root = add(model, 0, pin.JointModelFreeFlyer(), at(), "root", body(9))
+    bars = [add(model, root, pin.JointModelRZ(), at(x), f"hip{k}", body(k)) for k, x in enumerate((0.0, 1.2))]
+    knees = [add(model, j, pin.JointModelRZ(), at(1.0), f"knee{k}", body(2 + k)) for k, j in enumerate(bars)]
+    ends = [point(model, j, f"tip{j}", at(1.0)) for j in knees]
+    stands = np.r_[0.3, 0.2, 0.1, pin.Quaternion(pin.rpy.rpyToMatrix(0.3, -0.2, 0.4)).coeffs(), np.zeros(4)]
+    model.referenceConfigurations["stance"] = stands
+    chain = fb.ClosedChain(model, (fb.Closure(ends),), ("hip0", "hip1"))
+    fixed = chain.with_fixed_base()
+    assert fixed.joints == ("hip0", "hip1", "knee0", "knee1")
+    assert fixed.references["stance"].shape == (4,)
+    mode = fb.diagnose(fixed).q
+    x = mode[:2]
+    t = np.linspace(0.0, 1.0, 9)
+    motion = fb.motion.combine(*(fb.motion.harmonic(t, a, 0.1, period=1.0) for a in x))
+    held, floats = fb.drive(fixed, motion, mode), fb.drive(chain, motion, np.r_[stands[:7], mode])
+    np.testing.assert_allclose(floats.q[:, 7:], held.q, rtol=0.0, atol=1e-12)
+    one, two = fb.inverse_dynamics(fixed, held), fb.inverse_dynamics(chain, floats)
+    np.testing.assert_allclose(one.torque, two.torque, rtol=0.0, atol=1e-12 * np.abs(two.torque).max())
+    np.testing.assert_allclose(one.shaking_force, two.shaking_force, rtol=0.0, atol=1e-11)
+    neutral = chain.with_fixed_base(pin.neutral(chain.model))
+    np.testing.assert_allclose(neutral.model.jointPlacements[2].translation, [1.2, 0.0, 0.0], rtol=0.0, atol=1e-15)
+    with pytest.raises(InvalidInputError, match="base = 'fixed' but does not float"):
+        fixed.with_fixed_base()

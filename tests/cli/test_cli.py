@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mechanisms import five_bar
 
 import fivebar_pin as fb
 from fivebar_pin.cli import main
@@ -273,3 +274,57 @@ def test_what_is_balanced_reads_as_zero_and_is_written_with_every_digit(
     assert "as it is: 0 kg" in capsys.readouterr().out
     assert main(["loads", "five_bar_case_I"]) == 0
     assert "frame force" not in capsys.readouterr().out  # no weight, nothing to tell apart
+
+
+@pytest.mark.parametrize("actuated", [(), ("left", "right", "left_elbow", "right_elbow")])
+def test_view_shows_a_mechanism_standing_whose_motors_do_not_tell_how_it_moves(tmp_path, actuated) -> None:
+    """No motors, or one in every joint, so that no joint is passive."""
+    chain = five_bar().with_actuated(actuated)
+    file = tmp_path / "chain.urdf"
+    fb.save(chain, file)
+    page = tmp_path / "page.html"
+    assert main(["view", str(file), "--html", str(page)]) == 0
+    assert page.stat().st_size > 10_000
+
+
+FLOATING = """<mujoco model="arm on a float">
+  <worldbody><body name="float" pos="0 0 1"><freejoint name="root"/><geom size="0.2" mass="3"/>
+    <body name="arm" pos="0.2 0 0"><joint name="shoulder" axis="0 1 0"/>
+      <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.02" mass="0.5"/></body></body></worldbody>
+  <actuator><motor joint="shoulder"/></actuator>
+</mujoco>"""
+
+
+def test_a_floating_base_is_held_where_it_stands_or_fixed_by_a_flag(tmp_path, capsys) -> None:
+    file = tmp_path / "float.xml"
+    file.write_text(FLOATING)
+    assert main(["check", str(file)]) == 0
+    printed = capsys.readouterr().out
+    assert "mobility     1, and 6 held at rest" in printed
+    assert "note: the base floats on root: held where it stands unless it is simulated" in printed
+    assert main(["loads", str(file), "--out", str(tmp_path / "free")]) == 0
+    capsys.readouterr()
+    assert main(["check", str(file), "--fixed-base"]) == 0
+    printed = capsys.readouterr().out
+    assert "mobility     1\n" in printed and "root" not in printed
+    chain = fb.load(file, fixed_base=True)
+    assert chain.joints == ("shoulder",)
+    held = fb.load(file)
+    t = np.linspace(0.0, 1.0, 11)
+    motion = fb.motion.harmonic(t, 0.2, 0.3, period=1.0)
+    free, fixed = (fb.inverse_dynamics(c, fb.drive(c, motion)) for c in (held, chain))
+    np.testing.assert_allclose(free.torque, fixed.torque, rtol=0.0, atol=1e-12)
+    weight = 9.81 * 3.0  # of the float, which is part of the ground where it is fixed
+    np.testing.assert_allclose(free.frame_force - fixed.frame_force, np.tile([0.0, 0.0, -weight], (11, 1)), atol=1e-11)
+    base = free.tree_torque[:, :3]  # what holds the base, in its axes
+    np.testing.assert_allclose(base, -free.frame_force, rtol=0.0, atol=1e-11)
+
+
+def test_a_tolerance_is_taken_on_the_command_line(tmp_path, capsys) -> None:
+    file = tmp_path / "chain.urdf"
+    fb.save(five_bar(), file)
+    assert main(["check", str(file), "--tolerance", "1e-6"]) == 0
+    assert fb.load(file, closure_tolerance=1e-6).closure_tolerance == 1e-6
+    capsys.readouterr()
+    assert main(["check", str(file), "--tolerance", "0.5"]) != 0
+    assert "closure tolerance = 0.5 but must be from 0 to 0.001 m or rad" in capsys.readouterr().err

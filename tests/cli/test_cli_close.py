@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,7 @@ def test_a_joint_that_mimics_another_gets_no_motor_of_its_own(tmp_path: Path, ca
     urdf = geared(tmp_path)
     assert main(["close", str(urdf)]) == 0
     out = capsys.readouterr().out
-    assert "couplings that are stated already: turn mimic" in out and "mobility 2, exactly actuated" in out
+    assert "stated already: turn mimic" in out and "mobility 2, exactly actuated" in out
     chain = fb.load(urdf)
     assert set(chain.actuated) == {"psi", "gamma"} and {c.kind.value for c in chain.closures} == {"3d", "coupling"}
     assert np.abs(fb.closure_residual(chain, chain.references["closed"])).max() < 1e-12
@@ -186,9 +187,54 @@ def test_wrong_words_are_one_line_and_write_nothing(
 def test_only_a_urdf_can_be_closed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fb.save(fb.load(fb.io.shipped_path("slider_crank")), tmp_path / "one.xml")
     assert main(["close", str(tmp_path / "one.xml")]) == 1
-    assert "is no .urdf file; a sidecar closes the loops of a URDF only" in capsys.readouterr().err
+    assert (
+        "is none of .urdf, .sdf, .world, .xacro; a sidecar closes the loops of such a tree only"
+        in capsys.readouterr().err
+    )
     assert main(["close", str(tmp_path / "none.urdf")]) == 1
     assert "there is no such file or folder" in capsys.readouterr().err
     assert main(["new", "four-bar", "--out", str(tmp_path / "mine.yaml")]) == 0
     assert main(["close", str(tmp_path / "mine.yaml")]) == 1
     assert "is a linkage file, not a tree: its points close its loops" in capsys.readouterr().err
+
+
+SQUARE = """<sdf version="1.7"><model name="square"><link name="crank"/><link name="coupler"><pose>0 1 0 0 0 0</pose>
+</link><link name="rocker"><pose>1 0 0 0 0 0</pose></link>
+<frame name="end" attached_to="coupler"><pose>1 0 0 0 0 0</pose></frame>
+<joint name="a" type="revolute"><parent>world</parent><child>crank</child><axis/></joint>
+<joint name="b" type="revolute"><parent>crank</parent><child>coupler</child><axis/></joint>
+<joint name="d" type="revolute"><parent>world</parent><child>rocker</child><axis/></joint>{}</model></sdf>
+"""
+OPEN = (
+    '<frame name="loop_A" attached_to="end"/><frame name="loop_B" attached_to="rocker"><pose>0 1 0 0 0 0</pose></frame>'
+)
+CLOSED = '<joint name="c" type="ball"><pose>0 1 0 0 0 0</pose><parent>coupler</parent><child>rocker</child></joint>'
+
+
+@pytest.mark.parametrize(("more", "loops"), [(OPEN, 1), (CLOSED, 0)])
+@pytest.mark.parametrize("ending", [".sdf", ".urdf.xacro"])
+def test_an_sdf_and_a_xacro_get_their_sidecar(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, ending: str, more: str, loops: int
+) -> None:
+    """What the file closes itself does not stand in the sidecar again; a xacro is expanded first."""
+    tool = tmp_path / "bin" / "xacro"
+    tool.parent.mkdir()
+    tool.write_text(f"#!{sys.executable}\nimport sys\nprint(open(sys.argv[1]).read())\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tool.parent))
+    file = tmp_path / f"square{ending}"
+    file.write_text(SQUARE.format(more))
+    assert main(["close", str(file)]) == 0
+    assert "mobility 1, exactly actuated" in capsys.readouterr().out
+    chain = fb.load(file)
+    assert (len(chain.closures), chain.actuated) == (1, ("a",))
+    assert (tmp_path / "square.yaml").read_text().count("loop_A") == loops
+
+
+@pytest.mark.filterwarnings("always::fivebar_pin.errors.LeftOutWarning")
+def test_what_a_file_is_taken_without_is_a_note_of_one_line(tmp_path: Path, capsys) -> None:
+    file = tmp_path / "square.sdf"
+    file.write_text(SQUARE.format(f"{CLOSED}<plugin name='p' filename='p.so'/>"))
+    assert main(["check", str(file)]) == 0
+    told = f"fivebar-pin check: note: {file}: left out, as it does not move the mechanism: plugin\n"
+    assert capsys.readouterr().err == told

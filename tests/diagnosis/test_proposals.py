@@ -563,7 +563,10 @@ def test_a_freedom_that_moves_nothing_else_gets_no_motor() -> None:
     model = chain.model.copy()
     add(model, model.getJointId("left_elbow"), pin.JointModelRZ(), at(1.2), "spin", body(9))
     spun = replace(chain, model=model, closures=(fb.Closure(("spin_body", "tip_right")),), actuated=())
-    assert diagnose(spun).generic_mobility == 3
+    d = diagnose(spun)
+    assert d.generic_mobility == 2
+    assert [x.joint for x in d.idle] == ["spin"]
+    assert not any("never let" in p.text for p in d.problems)
     assert [m.joint for m in propose_motors(spun)] == ["left", "right"]
 
 

@@ -33,7 +33,7 @@ def by_decomposition(loads: fb.Loads) -> Reactions:
     unbalanced = np.array(loads.tree_torque)
     unbalanced[:, chain.actuated_index] -= loads.torque
     found = _by_decomposition(chain, path, unbalanced, loads.external)
-    return Reactions(chain, path, loads.external, *found, False)
+    return Reactions(chain, path, loads.external, *found, False, len(chain.closures))
 
 
 def assert_same(one: Reactions, two: Reactions) -> None:

@@ -623,3 +623,19 @@ def test_a_way_too_long_to_follow_to_the_first_sample_is_refused():
     near = fb.diagnose(chain).q
     with pytest.raises(InvalidInputError, match=r"step of motor 0 .* must be below"):
         fb.assemble(chain, [1e12], near)
+
+
+@pytest.mark.parametrize("lengths", [(0.4, 1.1, 0.9, 0.6), (1.0, 2.0, 1.0, 2.0), (0.5, 1.0, 0.6, 0.9)])
+@pytest.mark.parametrize("off", [0.0, 1e-12, 1e-8, 1e-6])
+def test_a_folded_four_bar_has_one_mode_and_one_that_is_just_not_folded_two(lengths, off):
+    chain = four_bar(lengths)
+    (mode,) = fb.assembly_modes(chain, [off])
+    assert np.abs(np.sin(mode)).max() < 2e-5
+    assert len(fb.assembly_modes(chain, [1e-3])) == 2
+
+
+def test_modes_between_which_a_rod_only_spins_are_one():
+    chain = rssr(ball=True)
+    modes = fb.assembly_modes(chain, [0.3])
+    assert len(modes) == 2
+    assert abs(np.sin(0.5 * (modes[0, -1] - modes[1, -1]))) > 0.1

@@ -281,7 +281,7 @@ def test_velocities_and_accelerations_are_the_rates_of_the_motion(name):
 
 
 def test_spherical_joint_and_free_spin():
-    """A coupler on a ball spins about its own length: mobility 2 with one motor."""
+    """A coupler on a ball spins about its own length, which moves nothing else: the motor tells the rest."""
     chain = mechanisms.rssr(ball=True)
     q = np.r_[0.3, pin.Quaternion(pin.rpy.rpyToMatrix(0.2, 0.3, 0.4)).coeffs(), 0.5]
     rng = np.random.default_rng(2)
@@ -292,6 +292,10 @@ def test_spherical_joint_and_free_spin():
     np.testing.assert_allclose(np.linalg.norm(motion.q[:, 1:5], axis=1), 1.0, atol=1e-12)
     supplied = torque_work.total - 0.2 * motion.q[:, 0]
     np.testing.assert_allclose(supplied, supplied[0], atol=1e-8)
+    loads = fb.inverse_dynamics(chain, motion)
+    np.testing.assert_allclose(loads.torque, 0.2, atol=1e-8)
+    free = mechanisms.five_bar().with_actuated(("left",))
+    motion = simulate(free, fb.diagnose(free).q, np.zeros(4), [0.1], np.linspace(0.0, 0.1, 3))
     assert np.isnan(motion.N).all(), "one motor does not determine two mobilities"
 
 

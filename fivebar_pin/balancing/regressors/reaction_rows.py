@@ -12,6 +12,7 @@ from fivebar_pin._arrays import Array, skew
 from fivebar_pin.balancing.regressors.body_motion import gravity_of, motion_of_bodies, torque_offset, tree_torque
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.dynamics.elastic import body_wrenches
+from fivebar_pin.mechanism.idle import at_rest, carried_by_rests
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import Decomposed
 from fivebar_pin.trajectory import Trajectory
@@ -21,6 +22,7 @@ __all__ = ["marked", "reaction_matrices"]
 
 def reaction_matrices(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array, Array]:
     """Return joint (n, nb, 6, 10 nb + 1) and closure (n, nc, 6, 10 nb + 1) reactions; the last column is the offset."""
+    own, chain = len(chain.closures), at_rest(chain)
     loops, state = loops_of(chain), motion_of_bodies(chain, trajectory)
     n, nb = state.p.shape[:2]
     wrench = state.wrench(gravity_of(chain))
@@ -45,12 +47,15 @@ def reaction_matrices(chain: ClosedChain, trajectory: Trajectory) -> tuple[Array
         parent = int(chain.model.parents[j])
         if parent:
             joint[:, parent - 1] += joint[:, j - 1]
-    return _at(joint, state.p), closure
+    joint = _at(joint, state.p)
+    for k, j in carried_by_rests(chain):
+        joint[:, j - 1] += closure[:, k]
+    return joint, closure[:, :own]
 
 
 def _multiplier_map(loops: Loops, J: Array) -> Array:
     """Return X (n, m, nv): closure forces of least norm = X @ unbalanced torque."""
-    decomposed = Decomposed.of(loops.scaled(J))
+    decomposed = Decomposed.of(loops.scaled(J), loops.misfit)
     return loops.scaled(decomposed.carrier(decomposed.ranks))
 
 
