@@ -11,7 +11,7 @@ from fivebar_pin.io._mjcf_include import mechanism_files
 from fivebar_pin.io._shipped import shipped, shipped_path
 from fivebar_pin.io._sidecar import MAX_SIDECAR_BYTES
 
-__all__ = ["TREES", "is_linkage_file", "mechanism_file", "named", "sidecar_file", "stem"]
+__all__ = ["TREES", "is_linkage_file", "mechanism_file", "named", "sidecar_file", "stem", "title"]
 
 TREES = (".urdf", ".sdf", ".world", ".xacro")
 """Endings of files that are read with a sidecar."""
@@ -19,6 +19,11 @@ _IN_A_FOLDER = (".urdf", ".xml", ".sdf", ".world", ".xacro")
 """Endings looked for in a folder, the first that is there counts."""
 _NO_MECHANISMS = ("package.xml",)
 _USUAL = ("robot", "model")
+_NAMELESS = {
+    *_USUAL, "assembly", "default", "description", "mjcf", "models", "mujoco", "mujoco model", "my_robot", "myrobot",
+    "onshape", "robots", "scene", "sdf", "solidworks", "src", "sw2urdf", "unnamed", "untitled", "urdf", "world", "xml",
+}  # fmt: skip
+"""What files call a mechanism that nobody has named, in small letters."""
 _LINKAGE = re.compile(rb"^linkage\s*:", re.MULTILINE)
 
 
@@ -96,6 +101,16 @@ def sidecar_file(tree: Path) -> Path | None:
     alone = len(beside) == 1 and len(_in_folder(tree.parent, (tree.suffix.lower(),))) == 1
     taken = {name for other in _in_folder(tree.parent, TREES) for name in (other.stem, stem(other))}
     return beside[0] if alone and beside[0].stem not in taken else None
+
+
+def title(stated: str | None, file: Path) -> str:
+    """Return what a mechanism is called: as its file says, unless that is the name of the program that wrote it.
+
+    Then it is the file's name or, where that says as little, that of the nearest folder that says more.
+    """
+    names = [stated or "", stem(file), *(folder.name for folder in file.resolve().parents)]
+    said = (name.strip() for name in names if name.strip() and name.strip().lower() not in _NAMELESS)
+    return next(said, stated or stem(file))
 
 
 def stem(tree: Path) -> str:

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from fivebar_pin.chain import Visual
 
-__all__ = ["find_file", "unreadable"]
+__all__ = ["find_file", "is_pointer", "unreadable"]
 
 _PACKAGES = ("package://", "model://")
 _FOLDERS = ("ROS_PACKAGE_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
@@ -66,7 +66,7 @@ def unreadable(visuals: Iterable[Visual]) -> list[str]:
     """Return, in words, the meshes that cannot be drawn: not found, or pointers that git-lfs left in their place."""
     meshes = dict.fromkeys(v.mesh for v in visuals if v.shape == "mesh")
     missing = [mesh for mesh in meshes if not _is_file(mesh)]
-    pointers = [mesh for mesh in meshes if mesh not in missing and _is_pointer(mesh)]
+    pointers = [mesh for mesh in meshes if mesh not in missing and is_pointer(mesh)]
     reasons = {
         "not found; ROS_PACKAGE_PATH or GZ_SIM_RESOURCE_PATH may name the folder of its package": missing,
         "a git-lfs pointer; `git lfs pull` brings it": pointers,
@@ -87,7 +87,7 @@ def _is_file(mesh: str) -> bool:
         return False
 
 
-def _is_pointer(mesh: str) -> bool:
+def is_pointer(mesh: str) -> bool:
     try:
         with open(mesh, "rb") as stream:
             return stream.read(len(_POINTER)) == _POINTER

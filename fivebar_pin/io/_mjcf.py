@@ -14,6 +14,7 @@ from fivebar_pin.chain import ClosedChain
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import FileFormatError, FiveBarPinError
 from fivebar_pin.io._build import build_model
+from fivebar_pin.io._find import title
 from fivebar_pin.io._left_out import left_out
 from fivebar_pin.io._mjcf_actuators import driven_joints
 from fivebar_pin.io._mjcf_adjust import adjust_masses
@@ -74,7 +75,7 @@ def read_mjcf(
     _massless(reader, root, bodies)
     found = Equality(reader, root, bodies).closures() if closures is None else closures
     driven = driven_joints(reader, root, bodies, found) if actuated is None else actuated
-    tree = bodies.tree(root.get("model") or path.stem)
+    tree = bodies.tree(title(root.get("model"), path))
     sidecar = Sidecar(gravity=gravity(reader, root), joint_order=_order(reader, root, bodies), joint_data=bodies.data)
     model = build_model(tree, sidecar, free_flyer=False, urdf=path, beside=path)
     stated = _stated_pose(model, bodies)

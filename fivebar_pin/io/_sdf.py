@@ -11,6 +11,7 @@ import numpy as np
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import FileFormatError
 from fivebar_pin.io._entries import UNIVERSE, JointEntry, LinkEntry, TreeEntry
+from fivebar_pin.io._find import title
 from fivebar_pin.io._gazebo import controlled, detachable, others
 from fivebar_pin.io._loops import BALL_WORDS, Loop, close, closing_pairs, refuse_forces, shared_point
 from fivebar_pin.io._sdf_frames import WORLD, Frames, relative
@@ -64,7 +65,7 @@ def read_sdf(path: Path, sdf: ElementTree.Element, *, named_loops: bool = False)
     poses = {thing.name: frames.pose(thing) for thing in frames.of("link")}
     root = _root(joints, links, poses)
     plugins = model.findall("plugin")
-    stated = hang(reader, model.get("name") or path.stem, root, links, poses, joints)
+    stated = hang(reader, title(model.get("name"), path), root, links, poses, joints)
     tree = _with_frames(frames, stated.tree, poses)
     loops = [*detachable(reader, plugins, poses), *_constraints(reader, frames, model)]
     tree, joined = close(reader, tree, loops + (closing_pairs(tree) if named_loops else []))

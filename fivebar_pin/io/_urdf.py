@@ -13,6 +13,7 @@ from fivebar_pin.closures import Coupling
 from fivebar_pin.errors import FileFormatError, UnknownNameError
 from fivebar_pin.io._build import stated_inertia
 from fivebar_pin.io._entries import UNIVERSE, UNLIMITED, JointEntry, LinkEntry, TreeEntry
+from fivebar_pin.io._find import title
 from fivebar_pin.io._loops import close, closing_pairs
 from fivebar_pin.io._stated import Stated
 from fivebar_pin.io._urdf_besides import IN_JOINT, IN_LINK, read_loops, read_motors, read_springs, unread
@@ -59,7 +60,7 @@ def read_urdf(path: Path, robot: ElementTree.Element, *, named_loops: bool = Fal
         if name == UNIVERSE:
             raise reader.fail(f"{name!r}", "is the name of the fixed world in Pinocchio; rename the link or joint")
     root = _root(reader, links, joints)
-    tree = TreeEntry(robot.get("name") or path.stem, root, links, joints)
+    tree = TreeEntry(title(robot.get("name"), path), root, links, joints)
     loops = read_loops(reader, robot, tree)
     found, closures = close(reader, tree, loops + (closing_pairs(tree) if named_loops else []))
     springs = read_springs(reader, robot, tree)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
+from fivebar_pin.io._meshes import is_pointer
 from fivebar_pin.springs import Spring
 from fivebar_pin.viz._geometry import BodyPaths, View, body_points, spring_ends
 from fivebar_pin.viz._recording import Colour
@@ -90,8 +92,13 @@ class Drawing:
 
     @property
     def visuals(self) -> tuple[Visual, ...]:
-        """Shapes of the chain that can be drawn: a mesh whose file is missing is left out."""
-        return tuple(v for v in self.chain.visuals if v.shape != "mesh" or Path(v.mesh).is_file())
+        """Shapes of the chain that can be drawn: a mesh whose file is missing, or stands for one, is left out."""
+        return tuple(v for v in self.chain.visuals if v.shape != "mesh" or _is_there(v.mesh))
+
+
+@lru_cache(maxsize=1024)
+def _is_there(mesh: str) -> bool:
+    return Path(mesh).is_file() and not is_pointer(mesh)
 
 
 def is_counterweight(visual: Visual) -> bool:
@@ -118,6 +125,7 @@ def body_names(chain: ClosedChain) -> tuple[str, ...]:
 def points_reached(chain: ClosedChain, poses: BodyPaths) -> Array:
     """Return points (k, 3) [m] that the mechanism passes: joints, ends of bodies and springs, corners, mass centres."""
     points = [poses.joints[:, j, :3, 3] for j in range(1, chain.model.njoints) if chain.model.parents[j] == 0]
+    points.append(_visual_corners(chain, 0))
     for j in range(1, chain.model.njoints):
         local = [*body_points(chain, j), np.array(chain.model.inertias[j].lever), *_visual_corners(chain, j)]
         R, p = poses.joints[:, j, :3, :3], poses.joints[:, j, :3, 3]
@@ -127,19 +135,41 @@ def points_reached(chain: ClosedChain, poses: BodyPaths) -> Array:
 
 
 def _visual_corners(chain: ClosedChain, joint: int) -> Array:
-    """Return the corners (k, 3) [m] of the boxes around the shapes of a body, in its frame; meshes are left out."""
+    """Return the corners (k, 3) [m] of the boxes around the shapes of a body, in its frame."""
     model, corners = chain.model, [np.empty((0, 3))]
     signs = np.array([[x, y, z, 0.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     for visual in chain.visuals:
         frame = find_frame(model, visual.frame)
-        if frame.parentJoint != joint or visual.shape == "mesh":
+        if frame.parentJoint != joint:
             continue
-        r = visual.size[0]
-        tall = 0.5 * visual.size[-1] + (r if visual.shape == "capsule" else 0.0)
-        half = {"box": 0.5 * np.array(visual.size), "sphere": np.full(3, r)}.get(visual.shape, np.array([r, r, tall]))
-        points = signs * [*half, 0.0] + [0.0, 0.0, 0.0, 1.0]
+        if visual.shape == "mesh":
+            low, high = np.array(extent(visual.mesh)) * visual.size
+            half, middle = 0.5 * np.abs(high - low), 0.5 * (high + low)
+        else:
+            half, middle = _half(visual), np.zeros(3)
+        points = signs * [*half, 0.0] + [*middle, 1.0]
         corners.append((points @ visual.placement.T @ frame.placement.homogeneous.T)[:, :3])
     return np.concatenate(corners)
+
+
+def _half(visual: Visual) -> Array:
+    """Return half the size (3,) of the box around a shape that is no mesh [m]."""
+    r = visual.size[0]
+    tall = 0.5 * visual.size[-1] + (r if visual.shape == "capsule" else 0.0)
+    return {"box": 0.5 * np.array(visual.size), "sphere": np.full(3, r)}.get(visual.shape, np.array([r, r, tall]))
+
+
+@lru_cache(maxsize=1024)
+def extent(mesh: str) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return the lowest and the highest corner of a mesh in its own unit; its origin where it cannot be read."""
+    import coal
+
+    try:
+        points = np.array(coal.MeshLoader().load(mesh, np.ones(3)).vertices())
+    except (ValueError, RuntimeError):  # whoever draws it says so
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    low, high = (tuple(float(x) for x in corner) for corner in (points.min(axis=0), points.max(axis=0)))
+    return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
 
 def amid_ground(chain: ClosedChain) -> Array:

@@ -14,6 +14,7 @@ from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure
 from fivebar_pin.errors import LeftOutWarning
 from fivebar_pin.io._entries import matrix_to_rpy, rpy_to_matrix
+from fivebar_pin.io._find import title
 
 ROBOTS = Path(pin.__file__).parents[4] / "share" / "example-robot-data" / "robots"
 
@@ -205,3 +206,25 @@ def four_bar_names() -> pin.Model:
             fixed = model.addFrame(pin.Frame(tip, joint, link, out, pin.FrameType.FIXED_JOINT))
             model.addBodyFrame(tip, joint, out, fixed)
     return model
+
+
+@pytest.mark.parametrize(
+    ("stated", "file", "name"),
+    [
+        ("delta", "robot.urdf", "delta"),
+        ("onshape", "delta.urdf", "delta"),
+        ("onshape", "robot.urdf", "leg_of_mine"),
+        ("MuJoCo Model", "scene.xml", "leg_of_mine"),
+        (" ", "delta.urdf.xacro", "delta"),
+    ],
+)
+def test_a_mechanism_is_not_called_after_the_program_that_wrote_it(tmp_path, stated, file, name):
+    folder = tmp_path / "leg_of_mine" / "urdf"
+    assert title(stated, folder / file) == name
+    text = f'<robot name="{stated}"><link name="a"/></robot>'
+    assert title(None, folder / "urdf.urdf") == "leg_of_mine"
+    if file.endswith(".urdf"):
+        folder.mkdir(parents=True)
+        (folder / file).write_text(text.replace("<link", '<link name="b"/><joint name="j" type="continuous">'
+            '<parent link="a"/><child link="b"/></joint><link'))  # fmt: skip
+        assert io.load(folder / file, closures=(), actuated=()).name == name

@@ -16,6 +16,8 @@ import fivebar_pin as fb
 from fivebar_pin import paper, viz
 from fivebar_pin.errors import InvalidInputError, OutputError
 from fivebar_pin.viz import _geometry, scene
+from fivebar_pin.viz._drawing import extent
+from fivebar_pin.viz._stage import Stage
 
 
 @pytest.fixture(scope="module")
@@ -203,3 +205,26 @@ def test_counterweights_are_named_by_their_bodies_in_one_entry(
         shown = viz.Shown.at(heavier, linkage.configuration(0.3, 1.5))
         legend = [entry["text"] for entry in _page._legend(scene._drawings([shown], 1.0, True))]
         assert legend[:5] == ["link1", "link2", "link3", "link4", "counterweight on link1, link2, link4"]
+
+
+def test_the_picture_holds_meshes_too_those_of_the_ground_among_them(tmp_path: Path) -> None:
+    """A mesh far larger than the arm that carries it, scaled; one that cannot be read has no size."""
+    mesh = tmp_path / "block.obj"
+    mesh.write_text("v 0 0 0\nv 200 0 0\nv 0 100 0\nv 0 0 300\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
+    broken = tmp_path / "broken.stl"
+    broken.write_text("no mesh")
+    assert extent(str(mesh)) == ((0.0, 0.0, 0.0), (200.0, 100.0, 300.0))
+    assert extent(str(broken)) == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for frame in ("universe", "link1"):
+        small = fb.ClosedChain(arm("z", "z"), (), ("joint0",))
+        frame = frame if frame in {f.name for f in small.model.frames} else small.model.frames[-1].name
+        large = replace(small, visuals=(fb.Visual(frame, "mesh", (0.1, 0.1, 0.1), mesh=str(mesh)),))
+        boxes = [
+            Stage.around(scene._drawings([viz.Shown.at(c, [0.1, 0.2])], 1.0, False)).boxes[0] for c in (small, large)
+        ]
+        grown = (boxes[1][1] - boxes[1][0]) - (boxes[0][1] - boxes[0][0])
+        assert grown.max() > 20.0, frame
+    pointer = tmp_path / "pointer.stl"
+    pointer.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+    chain = replace(small, visuals=(fb.Visual("universe", "mesh", (1, 1, 1), mesh=str(pointer)),))
+    assert "1 mesh file not found" in viz.page([viz.Shown.at(chain, [0.1, 0.2])])
