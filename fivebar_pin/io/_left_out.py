@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections import Counter
 from collections.abc import Iterable
@@ -21,5 +22,15 @@ def left_out(path: Path, things: Iterable[str]) -> None:
     """
     counted = [thing if n == 1 else f"{n} {thing}s" for thing, n in Counter(things).items()]
     if counted:
-        text = f"{path}: left out, as it does not move the mechanism: {', '.join(counted)}"
-        warnings.warn(text, LeftOutWarning, stacklevel=2)
+        text = f"{path}: left out: {', '.join(counted)}"
+        warnings.warn(text, LeftOutWarning, stacklevel=_caller())
+
+
+def _caller() -> int:
+    """Return how many calls back the one from outside of the library is, which the warning is shown at."""
+    frame, level = inspect.currentframe(), 0
+    while (
+        frame is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == __name__.partition(".")[0]
+    ):
+        frame, level = frame.f_back, level + 1
+    return level

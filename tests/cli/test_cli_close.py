@@ -236,5 +236,5 @@ def test_what_a_file_is_taken_without_is_a_note_of_one_line(tmp_path: Path, caps
     file = tmp_path / "square.sdf"
     file.write_text(SQUARE.format(f"{CLOSED}<plugin name='p' filename='p.so'/>"))
     assert main(["check", str(file)]) == 0
-    told = f"fivebar-pin check: note: {file}: left out, as it does not move the mechanism: plugin\n"
+    told = f"fivebar-pin check: note: {file}: left out: plugin\n"
     assert capsys.readouterr().err == told

@@ -135,7 +135,7 @@ TENDONS = """<mujoco><default><tendon stiffness="7"/><motor armature="0.1"/></de
 
 
 def test_fixed_tendons_of_one_joint_are_its_springs_and_their_motors_its_own(tmp_path: Path) -> None:
-    with pytest.warns(LeftOutWarning, match="mechanism: actuatorfrcrange of fixed 'u'$"):
+    with pytest.warns(LeftOutWarning, match="left out: actuatorfrcrange of fixed 'u'$"):
         twin = Twin(write(tmp_path, TENDONS))
     twin.assert_same()
     chain = twin.chain
@@ -200,7 +200,7 @@ def test_a_wide_range_of_a_fixed_tendon_is_a_bound_and_is_told(tmp_path: Path) -
     """The crank's limits let it go 13.96 rad, and the tendon twice as far."""
     tied = '<tendon><fixed name="far" range="-1.4 {}"><joint joint="crank" coef="-2"/></fixed>'
     path = write(tmp_path, LINKAGE.replace("<tendon>", tied.format(1.4), 1))
-    with pytest.warns(LeftOutWarning, match="mechanism: range of fixed 'far'$"):
+    with pytest.warns(LeftOutWarning, match="left out: range of fixed 'far'$"):
         fb.load(path)
     with pytest.raises(FileFormatError, match="fixed 'far': range: limits that tie bodies"):
         fb.load(write(tmp_path, LINKAGE.replace("<tendon>", tied.format(1.39), 1)))

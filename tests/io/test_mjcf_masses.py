@@ -65,7 +65,7 @@ def test_everything_that_does_not_move_the_mechanism_is_told(tmp_path: Path) -> 
     mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
     with pytest.warns(LeftOutWarning) as caught:
         fb.load(tmp_path / "m.xml")
-    assert str(caught[0].message).split("mechanism: ")[1] == (
+    assert str(caught[0].message).split("left out: ")[1] == (
         "height field asset, texture, contact exclusion, 2 sensors, density and viscosity of the fluid around it, "
         "2 lights, camera, plane, height field, mocap of body 'm', which stays where it is, ellipsoid shape, "
         "gravcomp of 1 bodies, which are of full weight here, 2 custom values"

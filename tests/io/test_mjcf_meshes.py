@@ -183,7 +183,7 @@ def test_a_mesh_that_cannot_be_drawn_is_told_once(tmp_path: Path, mesh: str, tol
     (tmp_path / "pointer.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
     body = '<geom type="mesh" mesh="m" mass="0"/>'
     path = model(tmp_path, mesh, 'type="mesh" mesh="m" mass="0"', body=body + '<geom size="0.1"/>')
-    with pytest.warns(LeftOutWarning, match=f"mechanism: {told}") as caught:
+    with pytest.warns(LeftOutWarning, match=f"left out: {told}") as caught:
         chain = fb.load(path)
     assert str(caught[0].message).count("'m'") == 1
     assert [visual.shape for visual in chain.visuals] == ["sphere"]
@@ -232,7 +232,7 @@ def test_a_mesh_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pytest
 def test_a_shape_fitted_to_a_mesh_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     """Where it is drawn: a hidden one of no mass needs no mesh."""
     path = model(tmp_path, 'file="none.obj"', 'type="box" mesh="m" mass="0"', body='<geom size="0.1"/>')
-    with pytest.warns(LeftOutWarning, match=r"mechanism: mesh 'm', which cannot be read \(there is no such file"):
+    with pytest.warns(LeftOutWarning, match=r"left out: mesh 'm', which cannot be read \(there is no such file"):
         fb.load(path)
     path.write_text(path.read_text().replace('mass="0"', 'mass="0" group="3"'))
     assert [visual.shape for visual in fb.load(path).visuals] == ["sphere"]

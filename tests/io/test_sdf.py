@@ -555,7 +555,7 @@ def test_plugins_state_welds_and_motors(tmp_path: Path) -> None:
         + PLUGIN.format("gz-sim-joint-position-controller-system", names)
         + PLUGIN.format("gz-sim-joint-state-publisher-system", "<joint_name>b</joint_name>")
     )
-    with pytest.warns(LeftOutWarning, match="left out, as it does not move the mechanism: plugin$"):
+    with pytest.warns(LeftOutWarning, match="left out: plugin$"):
         chain = io.load(write(tmp_path, FOUR_BAR[:start] + plugins + FOUR_BAR[end:]))
     assert [(c.name, c.kind) for c in chain.closures] == [("coupler~rocker", "6d")]
     assert chain.actuated == ("a",)
@@ -636,7 +636,7 @@ def test_what_is_beside_the_model_is_told(tmp_path: Path) -> None:
         "static model 'ground', include of model://sun, light of the world, light element, 2 sensors, "
         "absence of gravity on link 'base', audio element, initial position"
     )
-    assert sorted(str(one.message).partition("mechanism: ")[2].split(", ")) == sorted(told.split(", "))
+    assert sorted(str(one.message).partition("left out: ")[2].split(", ")) == sorted(told.split(", "))
 
 
 BAD = [

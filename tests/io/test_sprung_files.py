@@ -123,7 +123,7 @@ def test_springs_are_read_with_defaults_angles_and_automatic_lengths(tmp_path: P
     mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "rope.xml"
     path.write_text(MJCF)
-    with pytest.warns(LeftOutWarning, match="mechanism: idle tendon$"):
+    with pytest.warns(LeftOutWarning, match="left out: idle tendon$"):
         chain = io.load(path)
     first, second, on_a, on_b = chain.springs
     assert second == Spring("s", "roof", 3.0, 0.25, 0.5)
