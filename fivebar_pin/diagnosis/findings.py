@@ -55,7 +55,10 @@ def about_idle(idle: tuple[Idle, ...]) -> Iterator[Finding]:
         elif x.kind == Kind.BASE:
             yield Finding("note", f"{x}: held where it stands unless it is simulated")
         else:
-            yield Finding("warning" if x.kind == Kind.LOOSE else "note", f"{x}: held at rest unless it is simulated")
+            yield Finding(
+                "warning" if x.kind in (Kind.LOOSE, Kind.SPRUNG) else "note",
+                f"{x}: held at rest unless it is simulated",
+            )
 
 
 def about_mobility(

@@ -1,6 +1,7 @@
 """Freedoms that move nothing else: rods that spin about their own axis, bodies that no closure and no motor touches.
 
-They say nothing of how a mechanism moves, but leave its motion undetermined. A motion holds them at rest: beside the
+They say nothing of how a mechanism moves, but leave its motion undetermined. Joints that only a spring holds do, too,
+and are taken for as stiff as their springs where that is all that is missing. A motion holds them at rest: beside the
 closures of the chain stand rows of velocities alone, see `closures.rest`. Nothing holds them in a simulation.
 
 A freedom of that kind lives in the coordinates of the one or two joints (hinges about one point count as one) at which
@@ -28,6 +29,8 @@ from fivebar_pin.mechanism.closing import CLOSED, closed_enough
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.per_chain import once_per_chain
+from fivebar_pin.mechanism.rank import ranks_of, singular_values
+from fivebar_pin.springs import JointSpring
 
 __all__ = ["Idle", "Kind", "at_rest", "carried_by_rests", "idle_freedoms"]
 
@@ -39,10 +42,11 @@ _Columns = npt.NDArray[np.intp]
 
 
 class Kind(Enum):
-    """What is idle: bodies that spin, bodies that slide, a joint that nothing holds, a floating base, a prop."""
+    """What is idle: bodies that spin or slide; a joint that a spring alone, or nothing, holds; a base; a prop."""
 
     SPIN = "spin"
     SLIDE = "slide"
+    SPRUNG = "sprung"
     LOOSE = "loose"
     BASE = "base"
     PROP = "prop"
@@ -70,6 +74,7 @@ class Idle(Immutable):
         return {
             Kind.SPIN: f"{names} may spin about {'its own axis' if alone else 'one axis together'}",
             Kind.SLIDE: f"{names} may slide{'' if alone else ' together'}",
+            Kind.SPRUNG: f"its spring alone holds {self.joint}",
             Kind.LOOSE: f"no closure and no motor touches {self.joint}",
             Kind.BASE: f"the base floats on {self.joint}",
             Kind.PROP: f"no closure and no motor touches the free body {names}",
@@ -80,7 +85,7 @@ def at_rest(chain: ClosedChain) -> ClosedChain:
     """Return the chain with what holds its idle freedoms at rest, itself where it has none.
 
     Columns, frames and joints are those of the chain; frames and closures may follow behind its own. Where there are
-    no motors, a loose joint or a floating base is not held: nothing tells it from any other.
+    no motors, a loose or sprung joint or a floating base is not held: nothing tells it from any other.
     """
     held = _held(chain)
     return chain if held is None else held
@@ -103,7 +108,7 @@ def carried_by_rests(chain: ClosedChain) -> Iterator[tuple[int, int]]:
 def _held(chain: ClosedChain) -> ClosedChain | None:
     if not loops_of(chain).lacking:
         return None
-    held = [x for x in idle_freedoms(chain) if chain.na or x.kind not in (Kind.LOOSE, Kind.BASE)]
+    held = [x for x in idle_freedoms(chain) if chain.na or x.kind not in (Kind.SPRUNG, Kind.LOOSE, Kind.BASE)]
     rests = [rest for idle in held for rest in idle.rest]
     return _with(chain, rests) if rests else None
 
@@ -180,10 +185,24 @@ class _Search:
             yield from self._within(one, None)
         felt = [set(np.flatnonzero(self._felt[:, self._columns(x)].any(axis=1))) for x in self._clusters]
         for (k, one), (i, two) in combinations(enumerate(self._clusters), 2):
-            if self._known.shape[1] >= self._most:
-                return
-            if felt[k] & felt[i]:
+            if self._known.shape[1] < self._most and felt[k] & felt[i]:
                 yield from self._within(one, two)
+        yield from self._sprung()
+
+    def _sprung(self) -> list[Idle]:
+        """Return joints that their springs alone hold, where with them at rest the motors tell everything."""
+        model, found = self._chain.model, list[Idle]()
+        names = dict.fromkeys(s.joint for s in self._chain.springs if isinstance(s, JointSpring) and s.stiffness > 0.0)
+        rows = np.concatenate([self._J, self._known.T])[:, self._mine]
+        rank = int(ranks_of(singular_values(rows), self._loops.misfit))
+        for name in names:
+            k = int(model.idx_vs[model.getJointId(name)])
+            more = np.concatenate([rows, np.eye(self._chain.nv)[k : k + 1, self._mine]])
+            if self._mine[k] and int(ranks_of(singular_values(more), self._loops.misfit)) > rank:
+                rows, rank = more, rank + 1
+                body = _name(model, int(model.getJointId(name)))
+                found.append(Idle(Kind.SPRUNG, name, (body,), (Still(name, 0),)))
+        return found if rank == int(self._mine.sum()) else []
 
     def _about_one_point(self) -> list[list[int]]:
         """Gather joints that follow each other at one point; one alone is a list of its own."""

@@ -333,3 +333,22 @@ def test_a_robot_of_rods_between_balls_moves_as_one_whose_rods_cannot_spin():
     assert ranks[0] + 6 == ranks[1]  # the six crosses are bodies of their own
     modes = fb.assembly_modes(chain, [0.1, 0.1, 0.1])[:, -7:]
     assert len(modes) == len(np.unique(np.round(modes, 6), axis=0)) > 1  # a plate stands in one place once
+
+
+def test_a_joint_that_its_spring_alone_holds_is_held_where_nothing_else_is_missing():
+    """A five-bar with one motor and a spring in the other crank; a spring elsewhere in a determined loop is let be."""
+    base = five_bar()
+    for joint, held in (("right", ["right"]), ("left_elbow", ["left_elbow"]), ("left", [])):
+        chain = base.with_actuated(("left",)).with_springs([fb.JointSpring(joint, 50.0, 0.3)])
+        assert [x.joint for x in idle_freedoms(chain)] == held
+        if held:
+            d = fb.diagnose(chain)
+            assert d.ok and d.mobility == 1
+            assert any(p.text.startswith(f"its spring alone holds {joint}: held at rest") for p in d.problems)
+            q = d.q
+            path = fb.drive(chain, fb.motion.harmonic(np.linspace(0.0, 1.0, 9), q[0], 0.1, period=1.0), q)
+            k = chain.columns(joint)[0]
+            assert np.abs(path.q[:, k] - q[k]).max() < 1e-12
+    assert idle_freedoms(base.with_springs([fb.JointSpring("right_elbow", 5.0, 0.3)])) == ()
+    slack = base.with_actuated(("left",)).with_springs([fb.JointSpring("right", 0.0, 0.3, damping=1.0)])
+    assert idle_freedoms(slack) == ()
