@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from fivebar_pin import motion as laws
@@ -11,7 +13,7 @@ from fivebar_pin.errors import AssemblyError, InvalidInputError, SingularityErro
 from fivebar_pin.kinematics import assemble, drive
 from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
 from fivebar_pin.mechanism.loops import loops_of, open_message
-from fivebar_pin.mechanism.mobility import first_closed
+from fivebar_pin.mechanism.mobility import first_closed, inside_limits
 from fivebar_pin.trajectory import Trajectory
 
 
@@ -41,23 +43,26 @@ def motion_along(chain: ClosedChain, file: str | None, *, stand: bool = False) -
 
 
 def standing(chain: ClosedChain) -> Array:
-    """Return some assembled configuration: the model's own reference if it has one that closes.
+    """Return some assembled configuration: the first that keeps the joint limits, the model's own references first.
 
     Raises:
         AssemblyError: none was found.
     """
     import pinocchio as pin
 
-    loops = loops_of(chain)
+    loops, found = loops_of(chain), list[Array]()
     for q in [*chain.references.values(), pin.neutral(chain.model)]:
-        try:
-            return assemble(chain, loops.actuated_of(q[None])[0], q)
-        except (AssemblyError, SingularityError, InvalidInputError):
-            continue
+        with suppress(AssemblyError, SingularityError, InvalidInputError):
+            found.append(assemble(chain, loops.actuated_of(q[None])[0], q))
+            if inside_limits(chain, found[-1][None])[0]:
+                return found[-1]
     q, gap = first_closed(chain, 0, CLOSED)
-    if not closed_enough(loops, gap, CLOSED):
+    closed = bool(closed_enough(loops, gap, CLOSED))
+    if closed and (inside_limits(chain, q[None])[0] or not found):
+        return q
+    if not found:
         raise open_message(loops, residual_of(loops, q[None])[0], "anywhere that was looked")
-    return q
+    return found[0]
 
 
 def sway(chain: ClosedChain, q0: Array, *, samples: int = 121, period: float = 2.0) -> Trajectory | None:

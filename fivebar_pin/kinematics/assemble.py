@@ -16,6 +16,7 @@ from fivebar_pin.mechanism.closing import CLOSED, closed_enough, most_open, nudg
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
+from fivebar_pin.mechanism.mobility import inside_limits
 from fivebar_pin.mechanism.prepared import Prepared, prepared_of
 
 __all__ = [
@@ -87,7 +88,7 @@ def assemble_somewhere(
     q, residual = closed_from_starts(chain, loops, x, starts, seed, tolerance)
     if not q.shape[0]:
         raise open_message(loops, residual, f"at the actuated coordinates {x.tolist()} (best of {starts} starts)")
-    return np.asarray(q[0])
+    return np.asarray(q[int(np.argmax(inside_limits(chain, q)))])  # the first one, where none keeps them
 
 
 @finite()

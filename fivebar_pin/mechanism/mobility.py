@@ -26,6 +26,7 @@ __all__ = [
     "first_closed",
     "gap",
     "generic_site",
+    "inside_limits",
     "passive_sigma",
     "redundant_combinations",
     "site_at",
@@ -128,10 +129,14 @@ def closed_from(chain: ClosedChain, q: Array, tolerance: float) -> Array:
 
 def _best(chain: ClosedChain, loops: Loops, q: Array, sizes: Array, tolerance: float) -> int | None:
     """Return the first of configurations q (n, nq) that is closed and within the limits."""
-    low, high = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
-    inside = np.all((q >= low - _SLACK) & (q <= high + _SLACK), axis=1)
-    good = np.flatnonzero(closed_enough(loops, sizes, tolerance) & inside)
+    good = np.flatnonzero(closed_enough(loops, sizes, tolerance) & inside_limits(chain, q))
     return int(good[0]) if good.size else None
+
+
+def inside_limits(chain: ClosedChain, q: Array) -> npt.NDArray[np.bool_]:
+    """Return which configurations q (n, nq) keep the joint limits (n,)."""
+    low, high = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
+    return np.asarray(np.all((q >= low - _SLACK) & (q <= high + _SLACK), axis=1))
 
 
 def _within_limits(chain: ClosedChain, q: Array, rng: np.random.Generator) -> Array:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import five_bar
+from mechanisms import five_bar, four_bar
 
 import fivebar_pin as fb
 from fivebar_pin.cli import main
-from fivebar_pin.cli._moving import motion_along
+from fivebar_pin.cli._moving import motion_along, standing
 
 
 @pytest.fixture(scope="module")
@@ -328,3 +328,17 @@ def test_a_tolerance_is_taken_on_the_command_line(tmp_path, capsys) -> None:
     capsys.readouterr()
     assert main(["check", str(file), "--tolerance", "0.5"]) != 0
     assert "closure tolerance = 0.5 but must be from 0 to 0.001 m or rad" in capsys.readouterr().err
+
+
+def test_a_mechanism_stands_within_its_joint_limits() -> None:
+    """A four-bar whose limits allow one of its two assembly modes only, not the one next to the neutral pose."""
+    chain = four_bar()
+    modes = fb.assembly_modes(chain, [0.5])
+    near = standing(chain)
+    other = next(mode for mode in modes if np.sign(np.sin(mode[1] + mode[0])) != np.sign(np.sin(near[1] + near[0])))
+    model = chain.model.copy()
+    model.lowerPositionLimit[1], model.upperPositionLimit[1] = other[1] - 0.4, other[1] + 0.4
+    bounded = fb.ClosedChain(model, chain.closures, chain.actuated)
+    for q in (standing(bounded), fb.diagnose(bounded).q):
+        assert other[1] - 0.4 <= q[1] <= other[1] + 0.4
+        assert np.abs(fb.closure_residual(bounded, q)).max() < 1e-12
