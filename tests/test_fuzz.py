@@ -167,6 +167,7 @@ def sound(chain: fb.ClosedChain) -> None:
 SOURCES = [fb.io.shipped_path(name) for name in ("four_bar_crank_rocker", "slider_crank", "spatial_rssr")]
 
 
+@pytest.mark.filterwarnings("ignore::fivebar_pin.errors.LeftOutWarning")
 @pytest.mark.parametrize("which", ["urdf", "yaml", "both"])
 def test_mutated_urdf_and_sidecars(which: str, tmp_path: Path) -> None:
     rng = np.random.default_rng([SEED, 1, len(which)])
@@ -184,6 +185,7 @@ def test_mutated_urdf_and_sidecars(which: str, tmp_path: Path) -> None:
                 attempt(lambda chain=chain: str(fb.diagnose(chain)), texts[".urdf"] + texts[".yaml"])
 
 
+@pytest.mark.filterwarnings("ignore::fivebar_pin.errors.LeftOutWarning")
 def test_mutated_mjcf(tmp_path: Path) -> None:
     rng = np.random.default_rng([SEED, 2])
     for k, source in enumerate(SOURCES):
