@@ -136,6 +136,7 @@ def _load_tree(
         argument=closures is not None or actuated is not None,
         springs=(*stated.springs, *sidecar.springs),
         geometry=sidecar.geometry,
+        closure_tolerance=sidecar.closure_tolerance,
     )
     left_out(file, (*stated.left_out, *unreadable(visuals)))
     absent = [name for name in sidecar.joint_types if name not in tree.joints]
@@ -185,11 +186,21 @@ def make_chain(
     argument: bool,
     springs: tuple[Spring | JointSpring, ...] = (),
     geometry: Geometry | None = None,
+    closure_tolerance: float = 0.0,
 ) -> ClosedChain:
     """Return the chain; what is wrong with the file's own content is told as an error of the file."""
     named = Geometry() if geometry is None else geometry
     try:
-        return ClosedChain(model, closures, actuated, name=model.name, visuals=visuals, springs=springs, geometry=named)
+        return ClosedChain(
+            model,
+            closures,
+            actuated,
+            name=model.name,
+            visuals=visuals,
+            springs=springs,
+            geometry=named,
+            closure_tolerance=closure_tolerance,
+        )
     except FileFormatError:
         raise
     except FiveBarPinError as error:

@@ -28,18 +28,18 @@ from fivebar_pin.io._mjcf_tree import BodyTree
 from fivebar_pin.io._sidecar import Sidecar
 from fivebar_pin.springs import JointSpring, Spring
 
-__all__ = ["GRAIN", "MASSLESS", "ORDER", "STATED", "UNBOUNDED", "read_mjcf"]
+__all__ = ["GRAIN", "MASSLESS", "ORDER", "STATED", "TOLERANCE", "UNBOUNDED", "read_mjcf"]
 
-UNBOUNDED, ORDER, MASSLESS = "unbounded ", "joint order", "massless "
+UNBOUNDED, ORDER, MASSLESS, TOLERANCE = "unbounded ", "joint order", "massless ", "closure tolerance"
 """Names of <custom><numeric> entries that our writer makes.
 
 A hinge whose coordinates are cosine and sine; for each joint its place in the file's order, when the chain has them in
-another; a body whose mass of one `GRAIN` stands for none.
+another; a body whose mass of one `GRAIN` stands for none; how far loops may stay open.
 """
 GRAIN = 1e-14
 """Mass and moments of inertia that a moving body without any is written with: ten times MuJoCo's least [kg, kg m2]."""
 
-_OURS = (FACTOR, HINGE, MASSLESS, ORDER, UNBOUNDED)
+_OURS = (FACTOR, HINGE, MASSLESS, ORDER, TOLERANCE, UNBOUNDED)
 STATED = "qpos0"
 """MuJoCo's name for the configuration in which the file places the bodies."""
 _WIDTHS = {"JointModelSpherical": 4, "JointModelFreeFlyer": 7}
@@ -94,6 +94,7 @@ def read_mjcf(
     visuals = tuple(v for link in tree.links.values() for v in link.visuals)
     try:
         chain = ClosedChain(model, found, driven, name=tree.name, visuals=visuals, springs=springs)
+        chain = chain.with_tolerance(_tolerance(reader, root))
     except FiveBarPinError as error:
         if closures is not None or actuated is not None:
             raise
@@ -125,6 +126,12 @@ def _order(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> t
                 raise reader.fail(f"custom {ORDER!r}", "must name each place once")
             return tuple(bodies.order[int(k)] for k in places)
     return tuple(bodies.order)
+
+
+def _tolerance(reader: MjcfReader, root: ElementTree.Element) -> float:
+    """Return how far loops may stay open, as our writer noted it [m or rad]."""
+    stated = [e for e in root.findall("custom/numeric") if e.get("name") == TOLERANCE]
+    return reader.numbers(stated[-1], "data", 1, f"custom {TOLERANCE!r}", None)[0] if stated else 0.0
 
 
 def _unbounded(reader: MjcfReader, root: ElementTree.Element, bodies: BodyTree) -> None:

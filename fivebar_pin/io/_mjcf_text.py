@@ -18,7 +18,7 @@ from fivebar_pin.chain import ClosedChain, Visual, find_frame
 from fivebar_pin.chain.coordinates import q_slice
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.io._entries import JointEntry, TreeEntry
-from fivebar_pin.io._mjcf import GRAIN, MASSLESS, ORDER, UNBOUNDED
+from fivebar_pin.io._mjcf import GRAIN, MASSLESS, ORDER, TOLERANCE, UNBOUNDED
 from fivebar_pin.io._mjcf_springs import joint_springs_to_write, tendon_lines
 from fivebar_pin.io._mjcf_words import equality_lines
 from fivebar_pin.io._outline import outline
@@ -64,6 +64,8 @@ class _Writer:
         if self.order != sorted(self.order):
             places = numbers([self.order.index(j) for j in sorted(self.order)])
             self.numeric.append(f'    <numeric name="{ORDER}" data="{places}"/>')
+        if self.chain.closure_tolerance:
+            self.numeric.append(f'    <numeric name="{TOLERANCE}" data="{numbers([self.chain.closure_tolerance])}"/>')
         motors = [f"    <motor name={quoted(a)} joint={quoted(a)}/>" for a in self.chain.actuated]
         gravity = numbers(self.model.gravity.linear)
         meshes = [f"    <mesh name={quoted(n)} file={quoted(f)}{_scale(s)}/>" for (f, s), n in self.meshes.items()]

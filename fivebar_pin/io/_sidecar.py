@@ -5,8 +5,9 @@ Ours, written only when needed: ``closure_name`` and what the kinds of closure s
 ``length``, ``ratio``, ``offset``), one entry per closure; ``gravity``, ``joint_order``, ``joint_data`` (per joint:
 armature, limits and losses of joints with several coordinates), ``reference_configurations``, ``springs`` (each with
 ``frames``, ``stiffness``, ``length`` or ``joint``, ``stiffness``, ``rest``, and ``damping`` where it has some) and
-``parameters`` (named lengths and what follows them, see `_geometry`). ``closed_loop`` names two frames, for a coupling
-any number of joints, whose ratios stand in the same order:
+``parameters`` (named lengths and what follows them, see `_geometry`), ``closure_tolerance`` (how far loops of rounded
+dimensions may stay open). ``closed_loop`` names two frames, for a coupling any number of joints, whose ratios stand in
+the same order:
 
     closed_loop: [[tip_left, tip_right], [rod_end, slider], [wheel, crank]]
     type: [3d, distance, coupling]
@@ -72,7 +73,7 @@ DATA_WORDS = tuple(DATA_FIELDS)
 
 _KEYS = (
     "closed_loop", "type", "name_mot", "joint_name", "joint_type", "closure_name", "gravity", "joint_order",
-    "joint_data", "reference_configurations", "springs", "parameters",
+    "joint_data", "reference_configurations", "springs", "parameters", "closure_tolerance",
 )  # fmt: skip
 
 
@@ -89,6 +90,7 @@ class Sidecar:
     configurations: Mapping[str, list[float]] = field(default_factory=dict)
     springs: tuple[Spring | JointSpring, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
+    closure_tolerance: float = 0.0
 
 
 def read_sidecar(path: Path, *, max_bytes: int = MAX_SIDECAR_BYTES) -> Sidecar:
@@ -117,6 +119,8 @@ def dump_sidecar(sidecar: Sidecar) -> str:
     content |= {key: [v.get(key) for v in values] for key in _closure_keys() if any(key in v for v in values)}
     if any(c.name != "~".join(c.joins) for c in closures):
         content["closure_name"] = [c.name for c in closures]
+    if sidecar.closure_tolerance:
+        content["closure_tolerance"] = sidecar.closure_tolerance
     if sidecar.gravity is not None:
         content["gravity"] = _floats(sidecar.gravity)
     if sidecar.joint_order is not None:
@@ -217,6 +221,7 @@ class _Check:
             configurations=self.configurations(content.get("reference_configurations")),
             springs=self.springs(content.get("springs")),
             geometry=read_geometry(self, content.get("parameters")),
+            closure_tolerance=self.numbers("closure_tolerance", [content.get("closure_tolerance", 0.0)], 1)[0],
         )
 
     def closures(self, content: dict[str, Any]) -> tuple[Closure, ...]:

@@ -95,6 +95,7 @@ def _sidecar(chain: ClosedChain, tree: TreeEntry) -> Sidecar:
         configurations={name: [float(x) for x in q] for name, q in configurations(model)},
         springs=chain.springs,
         geometry=chain.geometry,
+        closure_tolerance=chain.closure_tolerance,
     )
 
 

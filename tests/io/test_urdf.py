@@ -12,7 +12,7 @@ from random_chains import VECTORS, assert_same, mass_matrix, random_chain, rando
 from fivebar_pin import closure_residual, io, paper
 from fivebar_pin.chain import ClosedChain, Visual
 from fivebar_pin.closures import Closure
-from fivebar_pin.errors import LeftOutWarning
+from fivebar_pin.errors import FileFormatError, LeftOutWarning
 from fivebar_pin.io._entries import matrix_to_rpy, rpy_to_matrix
 from fivebar_pin.io._find import title
 
@@ -228,3 +228,23 @@ def test_a_mechanism_is_not_called_after_the_program_that_wrote_it(tmp_path, sta
         (folder / file).write_text(text.replace("<link", '<link name="b"/><joint name="j" type="continuous">'
             '<parent link="a"/><child link="b"/></joint><link'))  # fmt: skip
         assert io.load(folder / file, closures=(), actuated=()).name == name
+
+
+@pytest.mark.parametrize("name", ["chain.urdf", "chain.xml"])
+def test_how_far_loops_may_stay_open_is_written_and_read(tmp_path, name):
+    chain = io.load("five_bar_case_I").with_tolerance(3.2e-7)
+    io.save(chain, tmp_path / name)
+    again = io.load(tmp_path / name)
+    assert again.closure_tolerance == 3.2e-7
+    io.save(chain.with_tolerance(0.0), tmp_path / "exact" / name)
+    assert "tolerance" not in "".join(f.read_text() for f in (tmp_path / "exact").iterdir())
+
+
+def test_a_closure_tolerance_of_a_sidecar_is_one_of_rounding(tmp_path):
+    io.save(io.load("five_bar_case_I"), tmp_path / "chain.urdf")
+    sidecar = tmp_path / "chain.yaml"
+    text = sidecar.read_text()
+    for value, told in (("0.5", "must be from 0 to 0.001"), ("much", "closure_tolerance")):
+        sidecar.write_text(text + f"closure_tolerance: {value}\n")
+        with pytest.raises(FileFormatError, match=told):
+            io.load(tmp_path / "chain.urdf")
