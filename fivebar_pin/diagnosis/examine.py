@@ -10,7 +10,6 @@ from fivebar_pin._arrays import Array, checked, frozen, integer
 from fivebar_pin.chain import ClosedChain
 from fivebar_pin.diagnosis.findings import (
     GIVEN,
-    ROUNDED,
     STILL,
     about_actuation,
     about_idle,
@@ -31,7 +30,7 @@ from fivebar_pin.mechanism.closing import CLOSED, closed_enough, residual_of
 from fivebar_pin.mechanism.complement import rates_of
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.idle import at_rest, idle_freedoms
-from fivebar_pin.mechanism.loops import Loops, loops_of
+from fivebar_pin.mechanism.loops import Loops, loops_of, rounded
 from fivebar_pin.mechanism.rank import SINGULAR, Decomposed, singular_values
 from fivebar_pin.trajectory import Trajectory
 
@@ -39,7 +38,6 @@ __all__ = ["ActuatedSet", "Actuation", "Diagnosis", "Finding", "RedundantRow", "
 
 Mask = npt.NDArray[np.bool_]
 
-_ROUNDING = 1e-4  # residual that may come from rounded dimensions [m or rad]
 _SETS = 12  # actuated sets listed
 _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 
@@ -151,12 +149,11 @@ def _start(chain: ClosedChain, q: npt.ArrayLike | None, seed: int, findings: lis
             )
     if loops.m and not closed_enough(loops, np.array([opened]), GIVEN)[0]:
         name, size = loops.worst(residual_of(loops, found[None])[0])
-        hint = f" {ROUNDED}" if size <= _ROUNDING * max(1.0, loops.length) else ""
         findings.append(
             Finding(
                 "error",
                 f"no configuration that closes the loops was found: closure {name} stays open by {size:.3g} m or rad. "
-                f"Check {loops.what_to_check}.{hint}",
+                f"Check {loops.what_to_check}.{rounded(loops, size)}",
             )
         )
     elif loops.m and loops.opposed(loops.see(found[None]))[0]:

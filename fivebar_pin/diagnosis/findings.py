@@ -13,12 +13,11 @@ from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import Actuation, Finding, RedundantRow
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.idle import Idle, Kind
-from fivebar_pin.mechanism.loops import loops_of
+from fivebar_pin.mechanism.loops import ROUNDED, loops_of
 from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = [
     "GIVEN",
-    "ROUNDED",
     "STILL",
     "about_actuation",
     "about_idle",
@@ -33,7 +32,6 @@ __all__ = [
 
 
 GIVEN = 1e-9  # residual up to which a given configuration counts as closed, and as within limits [m or rad]
-ROUNDED = "If its dimensions are rounded, state how far its loops may stay open: closure_tolerance, --tolerance."
 STILL = 1e-8  # scaled speed below which a joint counts as standing still [-]
 _NEAR = 1e-2  # distance to a type 2 singularity that is worth a warning [-]
 _ROADS = 1e-9  # difference of the two roads of inverse dynamics, of what adds up, that is no round-off [-]

@@ -24,12 +24,15 @@ from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.rank import ranks_of, singular_values
 from fivebar_pin.mechanism.tree import Tree
 
-__all__ = ["Loops", "Seen", "loops_of", "open_message"]
+__all__ = ["ROUNDED", "Loops", "Seen", "loops_of", "open_message", "rounded"]
 
 
 _Index = npt.NDArray[np.intp] | slice
 
+ROUNDED = "If its dimensions are rounded, state how far its loops may stay open: closure_tolerance, --tolerance."
+
 _GENERIC_SAMPLES = 12
+_ROUNDING = 1e-4  # residual that may come from rounded dimensions [m or rad; times a length above 1 m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -284,6 +287,11 @@ def loops_of(chain: ClosedChain) -> Loops:
     return Loops(chain)
 
 
+def rounded(loops: Loops, gap: float) -> str:
+    """Return what to do about loops that stay open by no more than rounded dimensions may make it, else nothing."""
+    return f" {ROUNDED}" if gap <= _ROUNDING * max(1.0, loops.length) else ""
+
+
 def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
     """Make the error for a configuration that does not close."""
     name, size = loops.worst(residual)
@@ -296,7 +304,7 @@ def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:
         )
     return AssemblyError(
         f"the mechanism cannot be assembled {where}: closure {name} stays open by {size:.3g} m or rad. "
-        f"Bring the actuated coordinates within reach, or check {loops.what_to_check}.{tied}",
+        f"Bring the actuated coordinates within reach, or check {loops.what_to_check}.{rounded(loops, size)}{tied}",
         closure=name,
         residual=size,
     )
