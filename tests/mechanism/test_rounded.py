@@ -82,7 +82,7 @@ def test_what_nothing_closes_is_not_said_to_move():
     assert not d.closed
     assert "mobility and actuation are those of closed loops only" in str(d)
     assert "mobility     " not in str(d)
-    with pytest.raises(AssemblyError, match="anywhere that was looked.* state how far its loops may stay open"):
+    with pytest.raises(AssemblyError, match=r"anywhere that was looked.* state how far its loops may stay open"):
         standing(chain)
 
 
