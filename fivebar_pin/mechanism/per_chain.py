@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Callable
 from functools import wraps
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from fivebar_pin.chain import ClosedChain
 
@@ -14,16 +13,21 @@ __all__ = ["T", "once_per_chain"]
 
 T = TypeVar("T")
 
+_MADE = "_made"  # where a chain keeps it, beside its fields: copies do not take it along
+_ABSENT = object()
+
 
 def once_per_chain(make: Callable[[ClosedChain], T]) -> Callable[[ClosedChain], T]:
-    """Remember what `make` returns, by chain; it must not refer to the chain itself, or neither is ever let go."""
-    made: weakref.WeakKeyDictionary[ClosedChain, T] = weakref.WeakKeyDictionary()
+    """Remember what `make` returns with the chain that it is made of."""
 
     @wraps(make)
     def remembered(chain: ClosedChain) -> T:
-        found = made.get(chain)
-        if found is None:
-            found = made.setdefault(chain, make(chain))  # one and the same for threads that ask at once
-        return found
+        made: dict[Any, Any] | None = chain.__dict__.get(_MADE)
+        if made is None:
+            made = chain.__dict__.setdefault(_MADE, {})
+        found = made.get(make, _ABSENT)
+        if found is _ABSENT:
+            found = made.setdefault(make, make(chain))  # one and the same for threads that ask at once
+        return found  # type: ignore[no-any-return]
 
     return remembered
