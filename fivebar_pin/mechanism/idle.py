@@ -207,11 +207,10 @@ class _Search:
     def _about_one_point(self) -> list[list[int]]:
         """Gather joints that follow each other at one point; one alone is a list of its own."""
         model, clusters = self._chain.model, dict[int, list[int]]()
-        children = np.bincount(np.array(model.parents)[1:], minlength=model.njoints)
         for j in range(1, model.njoints):
             parent = int(model.parents[j])
             apart = float(np.linalg.norm(model.jointPlacements[j].translation))
-            near = children[parent] == 1 and apart <= _ONE_POINT * self._chain.length
+            near = apart <= _ONE_POINT * self._chain.length
             joined = parent in clusters and near and self._turns(j) and self._turns(parent)
             clusters[j] = [*clusters.pop(parent), j] if joined else [j]
         return list(clusters.values())

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 import pytest
-from mechanisms import TILTED, add, at, body, close_at, five_bar, point, rssr
+from mechanisms import TILTED, add, at, body, close_at, five_bar, point, rssr, side_by_side
+from tied_chains import EXAMPLES
 
 import fivebar_pin as fb
 from fivebar_pin.closures.rest import Spin
@@ -60,7 +61,7 @@ def leg_between_balls(*, carrying: bool) -> Built:
 def floating_rod() -> Built:
     """Two cranks about skew axes, joined by a rod that is a body of its own, closed by a ball at either end."""
     model = pin.Model()
-    one = add(model, 0, pin.JointModelRZ(), at(), "one", body(1))
+    one = add(model, 0, pin.JointModelRZ(), at(0.03, -0.02, 0.1), "one", body(1))
     two = add(model, 0, pin.JointModelRY(), at(0.9, 0.3, -0.2), "two", body(2))
     rod = add(model, 0, pin.JointModelFreeFlyer(), at(0.1, 0.2, 0.3, (0.2, 0.1, 0.5)), "rod", body(3))
     q = np.r_[0.3, 0.4, 0.4, 0.1, 0.0, pin.Quaternion(pin.rpy.rpyToMatrix(0.3, -0.2, 0.4)).coeffs()]
@@ -120,7 +121,8 @@ def test_a_driven_motion_keeps_the_loops_closed_and_spins_nothing(make, bodies):
     assert np.abs(rates).max() < 1e-11 * np.abs(path.v).max()
     (rest,) = (c for c in at_rest(chain).closures if isinstance(c, Spin))
     model, data = chain.model, chain.model.createData()
-    j, carrier = (int(frame.split()[-1]) for frame in reversed(rest.frames))
+    j, carrier = int(rest.frames[1].split()[-1]), 0 if "one" in chain.joints else 1  # the ground, or the crank
+    assert at_rest(chain).length == pytest.approx(chain.length, rel=1e-15)  # units stay what they are
     for k in range(0, len(path), 50):
         pin.forwardKinematics(model, data, path.q[k], path.v[k])
         R, w = data.oMi[j].rotation, data.oMi[j].rotation @ data.v[j].angular
@@ -263,6 +265,31 @@ def test_a_mechanism_with_a_motor_too_few_is_refused_all_the_same():
     assert at_rest(chain) is chain
     with pytest.raises(InvalidInputError, match=r"leave 1 coordinate\(s\) undetermined"):
         fb.assemble(chain, [1.0])
+
+
+def test_joints_that_are_tied_to_each_other_are_not_idle():
+    """A pinion and its rack, without a motor: two coordinates that move together, and two bodies of their own."""
+    chain, _ = EXAMPLES["rack and pinion"]()
+    assert idle_freedoms(chain.with_actuated(())) == ()
+
+
+def test_springs_that_are_too_few_hold_nothing():
+    """Three four-bars in a row, one motor and one spring: what is missing is said of the motors."""
+    bars = (0.4, 1.1, 0.9, 1.0)
+    three = side_by_side(bars, bars, bars)
+    first, second = (name for name in three.joints if "crank" in name and name[-1] in "01")
+    chain = three.with_actuated((first,)).with_springs([fb.JointSpring(second, 9.0, 0.3)])
+    assert idle_freedoms(chain) == ()
+
+
+def test_without_motors_nothing_is_held_but_what_moves_nothing_else():
+    base = five_bar()
+    model = base.model.copy()
+    add(model, 0, pin.JointModelRY(), at(5.0), "pendulum", body(8))
+    add(model, 0, pin.JointModelFreeFlyer(), at(7.0), "box", body(8))
+    chain = fb.ClosedChain(model, base.closures, (), springs=[fb.JointSpring("right", 9.0, 0.3)])
+    assert fb.diagnose(chain).mobility == 3
+    assert [c.joins[0] for c in at_rest(chain).closures[1:]] == ["box"] * 6
 
 
 def test_a_rod_spins_beside_a_motor_too_few_and_is_found_without_motors():

@@ -47,6 +47,11 @@ def test_mobility_and_redundancy_are_those_of_the_exact_mechanism(make, grain):
     assert (d.mobility, d.generic_mobility, d.rank) == (exact.mobility, exact.generic_mobility, exact.rank) != (0, 0, 0)
     assert len(d.redundant) == len(exact.redundant)
     assert 0.0 < d.gap < 20.0 * grain
+    chain = rounded(make(), grain).with_tolerance(20.0 * grain)
+    assert np.isfinite(fb.complement(chain, d.q)).all()
+    nearby = fb.diagnose(chain, d.q + 0.01 * np.arange(1.0, chain.nq + 1.0))
+    assert nearby.closed and nearby.rank == d.rank
+    assert np.abs(nearby.q - d.q).max() < 0.1
 
 
 @cases
@@ -60,6 +65,9 @@ def test_it_is_driven_and_simulated_with_the_misfit_told(make, grain):
     assert 0.0 < path.worst_closure < 20.0 * grain
     np.testing.assert_allclose(path.q, model.q, rtol=0.0, atol=100.0 * grain)
     np.testing.assert_allclose(path.a, model.a, rtol=0.0, atol=1e3 * grain * np.abs(model.a).max())
+    coarse = fb.Motion(path.t[::6], path.q[::6, :1], path.v[::6, :1], path.a[::6, :1])
+    again = fb.drive(chain, coarse, path.q[0], limits="ignore")  # as near to closed, from however far
+    np.testing.assert_allclose(again.q, path.q[::6], rtol=0.0, atol=1e-12)
     loads = fb.inverse_dynamics(chain, path)
     other = fb.inverse_dynamics(chain, path, road="complement")
     np.testing.assert_allclose(loads.torque, other.torque, rtol=0.0, atol=1e-12 * np.abs(loads.torque).max())
