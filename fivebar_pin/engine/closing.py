@@ -16,7 +16,6 @@ from fivebar_pin.engine.compiled import compiled
 from fivebar_pin.engine.rows import jacobian, look
 from fivebar_pin.engine.tables import (
     CLOSED,
-    CORRECTION,
     GOING,
     LEAD,
     MISFIT,
@@ -27,6 +26,7 @@ from fivebar_pin.engine.tables import (
     ROWS,
     ROWS_END,
     SCALE,
+    SETTLED,
     Integers,
     X,
 )  # fmt: skip
@@ -36,7 +36,7 @@ from fivebar_pin.engine.vectors import larger
 __all__ = ["close"]
 
 ROUND_OFF = 1e-15  # scaled residual that is round-off of lengths of the chain [-]
-_POLISHED = 1e-9  # scaled residual below which one more step reaches round-off [-]
+_POLISHED = 1e-9  # scaled residual, or step, below which one more step reaches round-off [-]
 _MOST = 8  # steps
 _ASTRAY = 1.0  # largest step of a coordinate that is a correction [rad, or chain lengths]
 
@@ -50,7 +50,7 @@ def close(I: Integers, W: Array) -> None:
     correction that tells the end.
     """
     last, steps = False, 0
-    W[I[GOING]], W[I[CORRECTION]] = 1.0, inf
+    W[I[GOING]], W[I[SETTLED]] = 1.0, 0.0
     while W[I[GOING]] == 1.0:
         place(I, W)
         look(I, W)
@@ -59,7 +59,7 @@ def close(I: Integers, W: Array) -> None:
         closed = regular and (last or error <= ROUND_OFF)
         W[I[CLOSED]] = 1.0 if closed else 0.0
         W[I[GOING]] = 1.0 if regular and not closed and error < inf and steps < _MOST else 0.0
-        settled = error <= W[I[MISFIT]] and W[I[CORRECTION]] < _POLISHED
+        settled = error <= W[I[MISFIT]] and W[I[SETTLED]] == 1.0
         last, steps = error < _POLISHED or settled, steps + 1
         if W[I[GOING]] == 1.0:
             _step(I, W)
@@ -76,18 +76,22 @@ def largest_residual(I: Integers, W: Array) -> float:
 
 @compiled
 def _step(I: Integers, W: Array) -> None:
-    """Take one step of Newton; where it is too long for a correction, none, and the flag `GOING` is taken down."""
+    """Take one step of Newton; where it is too long for a correction, none, and the flag `GOING` is taken down.
+
+    The flag `SETTLED` says whether the step is so short that one more reaches round-off.
+    """
     for r in range(I[ROWS], I[ROWS_END], ROW_SIZE):
         W[I[r + LEAD]] = -W[I[r + RESIDUAL]]
     for k in range(I[NV]):
         W[I[X] + k] = 0.0
     solve(I, W)
-    W[I[CORRECTION]] = 0.0
+    W[I[SETTLED]] = 1.0
     for k in range(I[NV]):
         step = W[I[X] + k]
         if not abs(step) <= _ASTRAY * W[I[SCALE] + k]:
             W[I[GOING]] = 0.0
-        W[I[CORRECTION]] = max(W[I[CORRECTION]], abs(step) / W[I[SCALE] + k])
+        if not abs(step) < _POLISHED * W[I[SCALE] + k]:
+            W[I[SETTLED]] = 0.0
         W[I[MOVED] + k] += step
     if W[I[GOING]] == 1.0:
         integrate(I, W, I[X])

@@ -354,7 +354,7 @@ class _Layout:
             e.J_HERE: jacobian,
             e.J_BEFORE: jacobian, e.SIGNS: nb, e.NORMS: nb, e.SIGNS_BEFORE: nb, e.NORMS_BEFORE: nb, e.REACH: 1,
             e.LAST_STEP: 1, e.SECOND_STEP: 1, e.CLOSED: 1, e.GOING: 1, e.STATUS: 1, e.TO: na, e.M_BAR: na * na,
-            e.TO_V: na, e.TO_A: na, e.CORRECTION: 1,
+            e.TO_V: na, e.TO_A: na, e.SETTLED: 1,
         }  # fmt: skip
         for field, count in sizes.items():
             head[field] = self._room(count)
