@@ -13,7 +13,7 @@ from fivebar_pin.diagnosis import inertias
 from fivebar_pin.diagnosis.report import Actuation, Finding, RedundantRow
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.idle import Idle, Kind
-from fivebar_pin.mechanism.loops import ROUNDED, loops_of
+from fivebar_pin.mechanism.loops import IF_ROUNDED, loops_of
 from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = [
@@ -71,7 +71,8 @@ def about_mobility(
     if is_tree:
         yield Finding("note", "there are no closures: this is an open tree")
     if chain.nv == generic.rank:
-        yield Finding("error", f"the mechanism cannot move: mobility 0. A closure or its kind is too much. {ROUNDED}")
+        stuck = "the mechanism cannot move: mobility 0. A closure or its kind is too much."
+        yield Finding("error", f"{stuck} {IF_ROUNDED}")
     if here.rank < generic.rank:
         yield Finding("error", jump(chain, here, generic, "this configuration"))
     always, closed = ([r for r in redundant if r.scope == scope] for scope in ("always", "closed"))

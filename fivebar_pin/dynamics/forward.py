@@ -19,7 +19,7 @@ from fivebar_pin.dynamics.wrenches import checked_wrenches
 from fivebar_pin.errors import InvalidInputError
 from fivebar_pin.mechanism.closing import closed_enough
 from fivebar_pin.mechanism.configurations import Configurations
-from fivebar_pin.mechanism.rank import ROUNDED
+from fivebar_pin.mechanism.rank import raised
 
 __all__ = ["CLOSED", "constant_torque", "forward_dynamics", "require_closed", "require_consistent"]
 
@@ -124,7 +124,7 @@ def require_consistent(point: Configurations, v: Array) -> None:
     require_closed(point)
     u = v / loops.column_scale
     rate = point.independent.rate(u)
-    bound = max(CLOSED, ROUNDED * loops.misfit) * np.maximum(np.abs(u).max(axis=1), TINY)
+    bound = raised(CLOSED, loops.misfit) * np.maximum(np.abs(u).max(axis=1), TINY)
     worst = int(np.argmax(rate - bound))
     if rate[worst] > bound[worst]:
         raise InvalidInputError(

@@ -37,6 +37,7 @@ from fivebar_pin.engine.tables import (
     RAW,
     RAW_RHS,
     RHS,
+    ROUNDED,
     ROW_LIST,
     ROW_SIZE,
     ROWS,
@@ -55,7 +56,6 @@ from fivebar_pin.engine.tree import drift, move
 
 __all__ = ["accelerations", "complement", "velocities"]
 
-_ROUNDED = 10.0  # the same, in misfits [-]
 _TIED = 1e-7  # rate of closures at unit speed of a motor from which on they tie it to others [-]
 
 
@@ -72,7 +72,7 @@ def complement(I: Integers, W: Array) -> None:
             for k in range(n):
                 W[I[N_HERE] + I[columns + k] * na + a] = W[I[RHS] + k]
             for k in range(n, I[g + HEIGHT]):
-                if not abs(W[I[RHS] + k]) * W[I[SCALE] + I[I[MOTORS] + a]] <= max(_TIED, _ROUNDED * W[I[MISFIT]]):
+                if not abs(W[I[RHS] + k]) * W[I[SCALE] + I[I[MOTORS] + a]] <= max(_TIED, ROUNDED * W[I[MISFIT]]):
                     W[I[STATUS]] = TOGETHER
 
 

@@ -97,6 +97,7 @@ ANGULAR, LINEAR = 0, 3  # of a twist
 # How following a motion ended, in `STATUS`: where it should; before a singularity, or where nothing closes; at motors
 # that closures tie to each other.
 FOLLOWED, BLOCKED, TOGETHER = range(3)
+ROUNDED = 10.0  # singular value, or rate, up to which rows that contradict each other are one, in misfits [-]
 FARTHEST = 1e6  # way of a motor from one sample to the next that is a mistake [rad, or chain lengths]
 
 

@@ -14,7 +14,7 @@ from fivebar_pin._arrays import Array
 from fivebar_pin.errors import InvalidInputError, SingularityError
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops
-from fivebar_pin.mechanism.rank import ROUNDED, SINGULAR
+from fivebar_pin.mechanism.rank import SINGULAR, raised
 
 __all__ = ["complement_of", "rates_of", "require_regular"]
 
@@ -71,7 +71,7 @@ def require_regular(sigma: Array) -> None:
 def _require_independent(loops: Loops, J: Array, N: Array) -> None:
     """Raise unless J N = 0: more rows than passive coordinates may ask too much of the actuated ones."""
     left = np.abs(np.matmul(J, N * loops.column_scale[loops.actuated])).max(initial=0.0)
-    least = max(_INDEPENDENT, ROUNDED * loops.misfit)
+    least = raised(_INDEPENDENT, loops.misfit)
     if left > least * max(1.0, float(np.abs(N).max(initial=0.0))):
         raise InvalidInputError(
             "actuated joints",

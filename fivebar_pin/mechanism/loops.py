@@ -24,12 +24,12 @@ from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.rank import ranks_of, singular_values
 from fivebar_pin.mechanism.tree import Tree
 
-__all__ = ["ROUNDED", "Loops", "Seen", "loops_of", "open_message", "rounded"]
+__all__ = ["IF_ROUNDED", "Loops", "Seen", "loops_of", "open_message", "rounded"]
 
 
 _Index = npt.NDArray[np.intp] | slice
 
-ROUNDED = "If its dimensions are rounded, state how far its loops may stay open: closure_tolerance, --tolerance."
+IF_ROUNDED = "If its dimensions are rounded, state how far its loops may stay open: closure_tolerance, --tolerance."
 
 _GENERIC_SAMPLES = 12
 _ROUNDING = 1e-4  # residual that may come from rounded dimensions [m or rad; times a length above 1 m]
@@ -289,7 +289,7 @@ def loops_of(chain: ClosedChain) -> Loops:
 
 def rounded(loops: Loops, gap: float) -> str:
     """Return what to do about loops that stay open by no more than rounded dimensions may make it, else nothing."""
-    return f" {ROUNDED}" if gap <= _ROUNDING * max(1.0, loops.length) else ""
+    return f" {IF_ROUNDED}" if gap <= _ROUNDING * max(1.0, loops.length) else ""
 
 
 def open_message(loops: Loops, residual: Array, where: str) -> AssemblyError:

@@ -25,7 +25,7 @@ from fivebar_pin.mechanism.closing import STEP, closed_enough, iterate
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
 from fivebar_pin.mechanism.per_chain import once_per_chain
-from fivebar_pin.mechanism.rank import ROUNDED, SINGULAR
+from fivebar_pin.mechanism.rank import SINGULAR, raised
 
 __all__ = ["ROUND_OFF", "Chart", "Manifold", "manifold_of"]
 
@@ -151,12 +151,12 @@ class Manifold:
 
 def _settled(loops: Loops) -> float:
     """Return the scaled residual below which an iteration that gets no further has ended: round-off, or a misfit."""
-    return max(_SETTLED, ROUNDED * loops.misfit)
+    return raised(_SETTLED, loops.misfit)
 
 
 def _least(loops: Loops) -> float:
     """Return the singular value above which a direction counts."""
-    return max(SINGULAR, ROUNDED * loops.misfit)
+    return raised(SINGULAR, loops.misfit)
 
 
 class _LeastSteps:

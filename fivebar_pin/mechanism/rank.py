@@ -18,13 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from fivebar_pin._arrays import Array, block_svd, inverse
+from fivebar_pin.engine.tables import ROUNDED
 
 __all__ = [
     "BRANCHING",
     "HELD",
     "LEFT_OUT",
     "RANK_TOLERANCE",
-    "ROUNDED",
     "SINGULAR",
     "TIED",
     "UNDRIVEN",
@@ -32,6 +32,7 @@ __all__ = [
     "Factored",
     "factored",
     "pseudo_inverse",
+    "raised",
     "ranks_of",
     "singular_values",
     "smallest_values",
@@ -51,8 +52,6 @@ SINGULAR = 1e-7
 A residual of round-off, 1e-15, leaves such a coordinate open by 1e-8, and its accelerations, which go with the square
 of the inverse, without a digit.
 """
-ROUNDED = 10.0
-"""Singular value up to which rows that contradict each other by a misfit are one, in misfits [-]."""
 LEFT_OUT = 1e-6
 """Singular value left out of a Newton step in all coordinates, as part of the largest [-].
 
@@ -207,9 +206,14 @@ def factored(J: Array, rank: int) -> Factored:
     return Factored(V[:, :, rank:], back, s[:, rank - 1] if rank else np.ones(n), s[:, rank])
 
 
+def raised(bound: float, misfit: float) -> float:
+    """Return a bound on singular values, residuals or rates, raised to what rows with that misfit leave of them."""
+    return max(bound, ROUNDED * misfit)
+
+
 def ranks_of(s: Array, misfit: float = 0.0) -> npt.NDArray[np.intp]:
     """Return the rank that singular values (..., k), descending, stand for (...), of closures with that misfit."""
-    least = max(RANK_TOLERANCE, ROUNDED * misfit)
+    least = raised(RANK_TOLERANCE, misfit)
     return np.asarray(np.sum(s > least * np.maximum(1.0, s[..., :1]), axis=-1))
 
 
@@ -227,7 +231,7 @@ def smallest_values(M: Array) -> Array:
 
 def truncated_inverse(J: Array, misfit: float = 0.0) -> Array:
     """Return pseudo-inverses (n, nv, m) of scaled Jacobians without their flat directions, see `LEFT_OUT`."""
-    return np.asarray(np.linalg.pinv(J, rcond=max(LEFT_OUT, ROUNDED * misfit)))
+    return np.asarray(np.linalg.pinv(J, rcond=raised(LEFT_OUT, misfit)))
 
 
 def pseudo_inverse(J: Array) -> tuple[Array, Array]:
