@@ -266,7 +266,7 @@ def momentum_rows(
     """
     loops = loops_of(chain)
     to_space = space.injection() * space.scale
-    axes, plane = (np.eye(3), 3) if space.normal is None else (plane_axes(space.normal), 2)
+    ways, axes = (np.eye(3), np.eye(3)) if space.normal is None else np.split(plane_axes(space.normal), [2])
     linear, angular = [], []
     for k in range(samples.N.shape[2]):
         v = samples.N[:, :, k]
@@ -274,10 +274,10 @@ def momentum_rows(
         Y = BodyMotion.of(loops, samples.q, v / unit, poses=samples.poses).momentum()
         Y = np.swapaxes(Y, 1, 2).reshape(len(samples), 6, -1)
         if force:
-            linear.append(np.matmul(axes[:plane], Y[:, :3] / space.length) @ to_space)
+            linear.append(np.matmul(ways, Y[:, :3] / space.length) @ to_space)
         if moment:
             about_point = (Y[:, 3:] - np.matmul(skew(about), Y[:, :3])) / space.length**2
-            angular.append(np.matmul(axes[plane % 3 :], about_point) @ to_space)
+            angular.append(np.matmul(axes, about_point) @ to_space)
     none = np.zeros((0, 3, to_space.shape[1]))
     return np.concatenate(linear or [none]), np.concatenate(angular or [none])
 
