@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from fivebar_pin.chain import Visual
 
-__all__ = ["find_file", "is_pointer", "unreadable"]
+__all__ = ["find_file", "is_pointer", "is_there", "unreadable"]
 
 _PACKAGES = ("package://", "model://")
 _FOLDERS = ("ROS_PACKAGE_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
@@ -20,6 +20,7 @@ _PREFIXES = "AMENT_PREFIX_PATH"
 _MARKS = ("package.xml", "model.config")
 """Files by which a folder is a package or model, whatever it is called."""
 _POINTER = b"version https://git-lfs"
+"""How a file begins that stands for one kept in git's large file storage."""
 _MOST_NAMED = 3
 
 
@@ -66,7 +67,7 @@ def unreadable(visuals: Iterable[Visual]) -> list[str]:
     """Return, in words, the meshes that cannot be drawn: not found, or pointers that git-lfs left in their place."""
     meshes = dict.fromkeys(v.mesh for v in visuals if v.shape == "mesh")
     missing = [mesh for mesh in meshes if not _is_file(mesh)]
-    pointers = [mesh for mesh in meshes if mesh not in missing and is_pointer(mesh)]
+    pointers = [mesh for mesh in meshes if mesh not in missing and not is_there(mesh)]
     reasons = {
         "not found; ROS_PACKAGE_PATH or GZ_SIM_RESOURCE_PATH may name the folder of its package": missing,
         "a git-lfs pointer; `git lfs pull` brings it": pointers,
@@ -87,9 +88,19 @@ def _is_file(mesh: str) -> bool:
         return False
 
 
-def is_pointer(mesh: str) -> bool:
+def is_there(mesh: str) -> bool:
+    """Return whether there is such a file, and not a pointer that git-lfs left in its place."""
     try:
-        with open(mesh, "rb") as stream:
-            return stream.read(len(_POINTER)) == _POINTER
-    except OSError:
-        return False
+        return _is_file(mesh) and not is_pointer(mesh)
+    except OSError:  # whoever reads it says why it cannot be read
+        return True
+
+
+def is_pointer(mesh: str | Path) -> bool:
+    """Return whether a file is a pointer that git-lfs left in the place of a mesh.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with open(mesh, "rb") as stream:
+        return stream.read(len(_POINTER)) == _POINTER

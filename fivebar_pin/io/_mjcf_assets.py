@@ -12,13 +12,12 @@ import numpy as np
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.errors import UnknownNameError
+from fivebar_pin.io._meshes import is_pointer
 from fivebar_pin.io._mjcf_include import element_key
 from fivebar_pin.io._mjcf_reader import MjcfReader, quaternion_matrix
 
 __all__ = ["Assets", "Mesh"]
 
-_POINTER = b"version https://git-lfs"
-"""How a file begins that stands for one kept in git's large file storage."""
 _RULES = ("convex", "exact", "legacy", "shell")
 
 
@@ -50,11 +49,10 @@ class Mesh:
         if not os.path.isfile(self.file):
             return "cannot be read (there is no such file)"
         try:
-            with open(self.file, "rb") as stream:
-                start = stream.read(len(_POINTER))
+            pointer = is_pointer(self.file)
         except OSError as error:
             return f"cannot be read ({error.strerror or error})"
-        return "is a git-lfs pointer, not the mesh; run git lfs pull" if start == _POINTER else ""
+        return "is a git-lfs pointer, not the mesh; run git lfs pull" if pointer else ""
 
 
 class Assets:

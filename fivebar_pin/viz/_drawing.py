@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy.typing as npt
 
 from fivebar_pin._arrays import Array
 from fivebar_pin.chain import find_frame
-from fivebar_pin.io._meshes import is_pointer
+from fivebar_pin.io._meshes import is_there
 from fivebar_pin.springs import Spring
 from fivebar_pin.viz._geometry import BodyPaths, View, body_points, spring_ends
 from fivebar_pin.viz._recording import Colour
@@ -96,9 +95,7 @@ class Drawing:
         return tuple(v for v in self.chain.visuals if v.shape != "mesh" or _is_there(v.mesh))
 
 
-@lru_cache(maxsize=1024)
-def _is_there(mesh: str) -> bool:
-    return Path(mesh).is_file() and not is_pointer(mesh)
+_is_there = lru_cache(maxsize=1024)(is_there)
 
 
 def is_counterweight(visual: Visual) -> bool:

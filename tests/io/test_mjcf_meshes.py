@@ -9,7 +9,7 @@ import pytest
 
 import fivebar_pin as fb
 from fivebar_pin.errors import FileFormatError, LeftOutWarning
-from fivebar_pin.io import _mjcf_assets
+from fivebar_pin.io import _meshes
 
 mujoco = pytest.importorskip("mujoco")
 from mujoco_twin import Twin  # noqa: E402
@@ -223,7 +223,7 @@ def test_a_mesh_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pytest
     def closed(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(_mjcf_assets, "open", closed, raising=False)
+    monkeypatch.setattr(_meshes, "open", closed, raising=False)
     path = model(tmp_path, f'file="{obj(tmp_path).name}"', 'type="mesh" mesh="m" mass="0"', body='<geom size="0.1"/>')
     with pytest.warns(LeftOutWarning, match=r"mesh 'm', which cannot be read \(Permission denied\)"):
         fb.load(path)
