@@ -14,6 +14,7 @@ from fivebar_pin.diagnosis.report import Actuation, Finding, RedundantRow
 from fivebar_pin.mechanism.configurations import Configurations
 from fivebar_pin.mechanism.idle import Idle, Kind
 from fivebar_pin.mechanism.loops import IF_ROUNDED, loops_of
+from fivebar_pin.mechanism.mobility import beyond
 from fivebar_pin.mechanism.rank import SINGULAR
 
 __all__ = [
@@ -31,7 +32,7 @@ __all__ = [
 ]
 
 
-GIVEN = 1e-9  # residual up to which a given configuration counts as closed, and as within limits [m or rad]
+GIVEN = 1e-9  # residual up to which a given configuration counts as closed [m or rad]
 STILL = 1e-8  # scaled speed below which a joint counts as standing still [-]
 _NEAR = 1e-2  # distance to a type 2 singularity that is worth a warning [-]
 _ROADS = 1e-9  # difference of the two roads of inverse dynamics, of what adds up, that is no round-off [-]
@@ -175,8 +176,7 @@ def about_parts(
     dead = [k for k in passive if k not in locked and _is_still(here, k)]
     if dead:
         yield Finding("note", f"{', '.join(owners_of(chain, np.array(dead)))} stands still here (dead point)")
-    lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
-    outside = (here.q[0] < lower - GIVEN) | (here.q[0] > upper + GIVEN)
+    outside = beyond(here.q[0], np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit))
     if outside.any():
         owners = [j for j in range(1, model.njoints) if outside[q_slice(model, j)].any()]
         names = ", ".join(model.names[j] for j in owners)

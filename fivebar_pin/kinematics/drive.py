@@ -15,15 +15,13 @@ from fivebar_pin.kinematics.follow import follow
 from fivebar_pin.mechanism.closing import CLOSED, most_open, residual_of
 from fivebar_pin.mechanism.idle import at_rest
 from fivebar_pin.mechanism.loops import Loops, loops_of, open_message
+from fivebar_pin.mechanism.mobility import SLACK
 from fivebar_pin.mechanism.per_chain import once_per_chain
 from fivebar_pin.mechanism.prepared import prepared_of
 from fivebar_pin.motion import Motion
 from fivebar_pin.trajectory import Trajectory
 
 __all__ = ["drive"]
-
-
-_SLACK = 1e-9  # how far beyond a limit a coordinate still lies on it: closing leaves less [rad or m]
 
 
 @finite()
@@ -92,7 +90,7 @@ def _require_closed(loops: Loops, q: Array, gap: Array, tolerance: float) -> Non
 @once_per_chain
 def _limits(chain: ClosedChain) -> tuple[Array, Array]:
     """Return the limits of the coordinates (nq,), a little wider than the model has them."""
-    return np.array(chain.model.lowerPositionLimit) - _SLACK, np.array(chain.model.upperPositionLimit) + _SLACK
+    return np.array(chain.model.lowerPositionLimit) - SLACK, np.array(chain.model.upperPositionLimit) + SLACK
 
 
 def _check_limits(chain: ClosedChain, q: Array, motion: Motion) -> None:

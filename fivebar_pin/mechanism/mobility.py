@@ -20,6 +20,8 @@ from fivebar_pin.mechanism.loops import Loops, loops_of
 from fivebar_pin.mechanism.rank import ranks_of, singular_values, truncated_inverse
 
 __all__ = [
+    "SLACK",
+    "beyond",
     "close_all",
     "closed_from",
     "determining_sets",
@@ -36,7 +38,7 @@ __all__ = [
 
 _NEWTON = 8  # steps of Newton's method in all coordinates
 _NOTHING = 1e-8  # weight of a row in a combination that is round-off, pivots being one [-]
-_SLACK = 1e-9  # how far beyond a limit a coordinate still lies on it [rad or m]
+SLACK = 1e-9  # how far beyond a limit a coordinate still lies on it: closing leaves less [rad or m]
 _WIDE = 1e3  # limit from which on a coordinate is not drawn between its limits [rad or m]
 _STARTS = 48  # random starts when no configuration is given
 _WALKERS, _STRIDES = 8, 2  # samples and steps of the walk that finds generic configurations
@@ -135,8 +137,13 @@ def _best(chain: ClosedChain, loops: Loops, q: Array, sizes: Array, tolerance: f
 
 def inside_limits(chain: ClosedChain, q: Array) -> npt.NDArray[np.bool_]:
     """Return which configurations q (n, nq) keep the joint limits (n,)."""
-    low, high = np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit)
-    return np.asarray(np.all((q >= low - _SLACK) & (q <= high + _SLACK), axis=1))
+    outside = beyond(q, np.array(chain.model.lowerPositionLimit), np.array(chain.model.upperPositionLimit))
+    return np.asarray(~outside.any(axis=1))
+
+
+def beyond(q: Array, low: Array, high: Array) -> npt.NDArray[np.bool_]:
+    """Return which coordinates of configurations q (..., nq) lie beyond their limits (nq,) by more than `SLACK`."""
+    return np.asarray(~((q >= low - SLACK) & (q <= high + SLACK)))  # what is not a number too
 
 
 def _within_limits(chain: ClosedChain, q: Array, rng: np.random.Generator) -> Array:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from fivebar_pin._arrays import Array, frozen, seal
 from fivebar_pin.dynamics.compiled_calls import told_by_closures
 from fivebar_pin.engine.tables import FOLLOWED, NA, NV, STATUS, unwritten
+from fivebar_pin.mechanism.mobility import beyond
 from fivebar_pin.sweeps.problem import Problem
 from fivebar_pin.sweeps.result import Status
 from fivebar_pin.sweeps.terms import widths
@@ -17,7 +18,6 @@ from fivebar_pin.sweeps.terms import widths
 __all__ = ["Chunk", "run"]
 
 _LEFT = 1e-7  # how far rows that were left out may be open, or open at unit speed of a motor, as round-off [-]
-_SLACK = 1e-9  # how far beyond a limit a coordinate still lies on it: closing leaves less [rad or m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,9 +91,8 @@ class _Bench:
             return Status.UNLIKE, 0
         if done < n:
             return Status.SINGULAR, done
-        low, high = self.problem.limits
-        beyond = np.any((self.q < low - _SLACK) | (self.q > high + _SLACK), axis=1)
-        return (Status.LIMITS, int(np.argmax(beyond))) if beyond.any() else (Status.OK, n)
+        outside = beyond(self.q, *self.problem.limits).any(axis=1)
+        return (Status.LIMITS, int(np.argmax(outside))) if outside.any() else (Status.OK, n)
 
     def _load(self, constants: Array) -> bool:
         """Compute what moves a design, and tell whether all its springs have a direction."""
